@@ -1,0 +1,154 @@
+"""The control step and the trial: the same for one robot and for thousands."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from epuck_mj.constants import PROXIMITY_RANGE
+from epuck_mj.fitness import StepFitness, step_fitness
+from epuck_mj.motors import Speeds, command
+from epuck_mj.sensors import Reading, observe
+
+Policy = Callable[[np.ndarray], np.ndarray]
+
+
+class Robot(Protocol):
+    """Anything that takes wheel speeds and reports what it senses one step later."""
+
+    def step(self, command: np.ndarray) -> Reading:
+        """Drive for one control step; what is sensed at its end."""
+        ...
+
+
+class Robots(Robot, Protocol):
+    """Robots that start where they are put and can be retired one by one."""
+
+    def reset(self, starts: np.ndarray) -> Reading:
+        """Put one robot on each pose `(robots, 3)`: x, y [m], yaw [rad]."""
+        ...
+
+    def keep(self, mask: np.ndarray) -> None:
+        """Go on with those robots, of the ones still active, that `mask` names."""
+        ...
+
+
+@dataclass(frozen=True)
+class TaskParameters:
+    """What a trial is.
+
+    Attributes:
+      steps: control steps of a trial.
+      control_step: duration of a control step [s].
+      fitness: name of the step fitness, `product` or `literal`.
+      sensor_range: where an obstacle stops being seen [m].
+      speeds: what a full action means.
+
+    Source: paper, section 4, where it says; our choices otherwise.
+    """
+
+    steps: int = 300
+    control_step: float = 0.1
+    fitness: str = "product"
+    sensor_range: float = PROXIMITY_RANGE
+    speeds: Speeds = field(default_factory=Speeds)
+
+    @property
+    def step_fitness(self) -> StepFitness:
+        """The step fitness itself."""
+        return step_fitness(self.fitness)
+
+
+@dataclass(frozen=True)
+class ControlStep:
+    """One control step of robots `(...)`: decided, carried out and judged.
+
+    Attributes:
+      action: what the policy decided, `(..., 2)`.
+      command: wheel speeds sent [rad/s], `(..., 2)`.
+      reading: what was sensed after the world moved.
+      observation: the same as network input, `(..., 8)`: the next step's input.
+      fitness: step fitness, `(...)`; 0 in a step that ends in a crash.
+    """
+
+    action: np.ndarray
+    command: np.ndarray
+    reading: Reading
+    observation: np.ndarray
+    fitness: np.ndarray
+
+
+def control_step(
+    robot: Robot, policy: Policy, observation: np.ndarray, task: TaskParameters
+) -> ControlStep:
+    """One control step from `observation` `(..., 8)` on."""
+    action = policy(observation)
+    wheels = command(action, task.speeds)
+    reading = robot.step(wheels)
+    seen = observe(reading.distance, task.sensor_range)
+    # a crash stops the calculation: its own step earns nothing
+    fitness = np.where(reading.contact, 0.0, task.step_fitness(action, seen))
+    return ControlStep(action, wheels, reading, seen, fitness)
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Outcome of `(trials,)` trials.
+
+    Attributes:
+      fitness: sum of the step fitness, `(trials,)`.
+      steps: control steps lived, the crash step included, `(trials,)`.
+      crashed: whether a crash ended the trial, `(trials,)`.
+    """
+
+    fitness: np.ndarray
+    steps: np.ndarray
+    crashed: np.ndarray
+
+
+class BatchPolicy(Protocol):
+    """A policy with one member per robot, from which members can be picked."""
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """Actions `(robots, 2)` for observations `(robots, 8)`."""
+        ...
+
+    def __getitem__(self, index: np.ndarray) -> "BatchPolicy":
+        """The members that a mask `(robots,)` names."""
+        ...
+
+
+def run_trials(
+    robots: Robots, policy: BatchPolicy, starts: np.ndarray, task: TaskParameters
+) -> Trials:
+    """One trial per start; a robot that crashes is not stepped again.
+
+    Args:
+      robots: to put on the starts.
+      policy: one member per start.
+      starts: poses `(trials, 3)`: x, y [m], yaw [rad].
+      task: what a trial is.
+    """
+    n_trials = len(starts)
+    fitness = np.zeros(n_trials)
+    steps = np.zeros(n_trials, int)
+    crashed = np.zeros(n_trials, bool)
+    active = np.arange(n_trials)
+    observation = observe(robots.reset(starts).distance, task.sensor_range)
+    for _ in range(task.steps):
+        step = control_step(robots, policy, observation, task)
+        observation = step.observation
+        fitness[active] += step.fitness
+        steps[active] += 1
+        # the crashed leave; everything kept per robot follows
+        contact = step.reading.contact
+        if contact.any():
+            crashed[active[contact]] = True
+            alive = ~contact
+            active, observation = active[alive], observation[alive]
+            if not active.size:
+                break
+            policy = policy[alive]
+            robots.keep(alive)
+    return Trials(fitness, steps, crashed)

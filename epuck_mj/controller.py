@@ -1,0 +1,184 @@
+"""The paper's network: sensors in, one hidden layer, two wheels' worth out.
+
+Sums are written out term by term instead of as a matrix product: BLAS orders a sum
+by the size of the batch, and a controller must act the same alone and in a crowd.
+"""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from epuck_mj.constants import N_PROXIMITY
+from epuck_mj.errors import UserError
+
+N_ACTIONS = 2
+
+
+@dataclass(frozen=True)
+class Network:
+    """Shape of the network.
+
+    Attributes:
+      hidden: number of hidden neurons.
+      biases: whether hidden and output neurons have a bias weight.
+    """
+
+    hidden: int = 4
+    biases: bool = False
+
+    @property
+    def n_genes(self) -> int:
+        """Number of weights: 40 for the paper's 8-4-2 without biases."""
+        bias = int(self.biases)
+        return (N_PROXIMITY + bias) * self.hidden + (self.hidden + bias) * N_ACTIONS
+
+    def decode(self, genomes: np.ndarray) -> "Controller":
+        """The controllers of genomes `(..., genes)`.
+
+        A genome lists the hidden neurons one after the other, each with its incoming
+        weights (and its bias last), then the output neurons likewise.
+
+        Raises:
+          ValueError: if the genomes have another length.
+        """
+        genomes = np.asarray(genomes, float)
+        if genomes.shape[-1] != self.n_genes:
+            raise ValueError(
+                f"expected genomes of {self.n_genes} genes for {self}, "
+                f"got {genomes.shape[-1]}"
+            )
+        n_in = N_PROXIMITY + self.biases
+        batch = genomes.shape[:-1]
+        hidden, output = np.split(genomes, [n_in * self.hidden], axis=-1)
+        hidden = hidden.reshape(*batch, self.hidden, n_in)
+        output = output.reshape(*batch, N_ACTIONS, self.hidden + self.biases)
+        return Controller(
+            np.ascontiguousarray(np.moveaxis(hidden, -1, 0)),
+            np.ascontiguousarray(np.moveaxis(output, -1, 0)),
+        )
+
+
+@dataclass(frozen=True)
+class Controller:
+    """One controller, or a batch `(...)` of them; call it with observations.
+
+    Attributes:
+      hidden: weights `(inputs, ..., hidden)`; one row more than the observation
+        has values is a bias.
+      output: weights `(hidden, ..., 2)`, likewise.
+    """
+
+    hidden: np.ndarray
+    output: np.ndarray
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """Actions `(..., 2)` for observations `(..., 8)`: v in [0, 1], w in [-1, 1].
+
+        Source: paper, section 4. w is 2 sigmoid - 1, so that 0 drives straight on.
+        """
+        action = _half_tanh(_layer(self.activation(observation), self.output))
+        action[..., 0] += 1.0
+        action[..., 0] *= 0.5
+        return action
+
+    def activation(self, observation: np.ndarray) -> np.ndarray:
+        """Output of the hidden neurons, `(..., hidden)` in [0, 1]."""
+        hidden = _half_tanh(_layer(observation, self.hidden))
+        hidden += 1.0
+        hidden *= 0.5
+        return hidden
+
+    def __getitem__(self, index: Any) -> "Controller":
+        """The controllers at `index` of the batch, in numpy's sense."""
+        return Controller(self.hidden[:, index], self.output[:, index])
+
+
+def _layer(inputs: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Weighted sums `(..., neurons)` of inputs `(..., n)`, added in their order."""
+    total = inputs[..., 0, None] * weights[0]
+    for i in range(1, inputs.shape[-1]):
+        total += inputs[..., i, None] * weights[i]
+    if len(weights) > inputs.shape[-1]:
+        total += weights[-1]
+    return total
+
+
+def _half_tanh(x: np.ndarray) -> np.ndarray:
+    """tanh(x / 2) = 2 sigmoid(x) - 1, in place: never overflows."""
+    x *= 0.5
+    return np.tanh(x, out=x)
+
+
+@dataclass(frozen=True)
+class ControllerFile:
+    """A controller with all that is needed to use it, as stored in JSON.
+
+    Attributes:
+      network: its shape.
+      genome: its weights, `(genes,)`.
+      task: what its world was: speeds, sensor law, fitness, steps (plain values).
+      scene: robot and arena it was evolved in, with hashes of their MJCF.
+      scores: stored and held-out fitness, and how each was measured.
+    """
+
+    network: Network
+    genome: np.ndarray
+    task: dict[str, Any]
+    scene: dict[str, Any]
+    scores: dict[str, Any]
+
+    @property
+    def controller(self) -> Controller:
+        """The controller, ready to be called."""
+        return self.network.decode(self.genome)
+
+    def to_json(self) -> str:
+        """The file's text; the genome comes back bit for bit."""
+        fields = {
+            "format": FORMAT,
+            "network": asdict(self.network),
+            "task": self.task,
+            "scene": self.scene,
+            "scores": self.scores,
+            "genome": [float(gene) for gene in self.genome],
+        }
+        return json.dumps(fields, indent=1) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Read `to_json`'s text back.
+
+        Raises:
+          ValueError: if it is anything else.
+        """
+        fields = json.loads(text)
+        if not isinstance(fields, dict) or fields.get("format") != FORMAT:
+            raise ValueError(f"expected a JSON object with format '{FORMAT}'")
+        network = Network(**fields["network"])
+        genome = np.array(fields["genome"], float)
+        if genome.shape != (network.n_genes,) or not np.isfinite(genome).all():
+            raise ValueError(
+                f"expected {network.n_genes} finite genes, got {genome.size}"
+            )
+        return cls(network, genome, fields["task"], fields["scene"], fields["scores"])
+
+
+FORMAT = "epuck_mj.controller/1"
+
+
+def load(path: str | Path) -> ControllerFile:
+    """The controller stored at `path`.
+
+    Raises:
+      UserError: if there is none, or it is not a controller file.
+    """
+    path = Path(path)
+    try:
+        return ControllerFile.from_json(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UserError(f"cannot read controller '{path}': {error.strerror}") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise UserError(f"'{path}' is not a controller file: {error}") from None

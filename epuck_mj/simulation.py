@@ -1,0 +1,76 @@
+"""Any number of simulated robots, each in an arena of its own, stepped at once.
+
+One `mujoco.batch.Batch` holds them; its threads step the ones still active. What a
+robot does depends on its start and commands only: not on the number of threads, nor
+on which others share the batch.
+"""
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from epuck_mj.model import Scene
+from epuck_mj.sensors import Reading
+
+
+class SimulatedRobots:
+    """Up to `capacity` robots in copies of one scene."""
+
+    def __init__(self, scene: Scene, capacity: int, threads: int = 0):
+        """Allocate the robots.
+
+        Args:
+          scene: robot and arena.
+          capacity: the most robots that a reset can place.
+          threads: threads that step them; 0 is one per core.
+        """
+        self.scene = scene
+        self.capacity = capacity
+        # one MjData each, so that sensors refreshed after a step are not
+        # computed again at the start of the next
+        self._batch = Batch(scene.model, capacity, threads, persistent=True)
+        self._qpos = self._batch.bind("qpos")
+        self._ctrl = self._batch.bind("ctrl")
+        self._sensordata = self._batch.bind("sensordata")
+        self._active = np.zeros(0, np.int32)
+
+    def reset(self, starts: np.ndarray) -> Reading:
+        """Put a robot at rest on each start `(robots, 3)`: x, y [m], yaw [rad].
+
+        Raises:
+          ValueError: if there are more starts than robots.
+        """
+        if len(starts) > self.capacity:
+            raise ValueError(
+                f"expected at most {self.capacity} starts, got {len(starts)}"
+            )
+        self._active = np.arange(len(starts), dtype=np.int32)
+        self._batch.reset(self._active, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        self._qpos[: len(starts)] = self.scene.qpos(starts)
+        self._batch.forward(self._active, stage=mujoco.mjtStage.mjSTAGE_VEL.value)
+        return self._reading()
+
+    def step(self, command: np.ndarray) -> Reading:
+        """Drive the active robots for one control step.
+
+        Args:
+          command: wheel speeds [rad/s], `(active, 2)`.
+        """
+        self._ctrl[self._active[:, None], self.scene.wheels] = command
+        self._batch.step(
+            self._active,
+            nstep=self.scene.n_substeps,
+            stage=mujoco.mjtStage.mjSTAGE_VEL.value,
+        )
+        return self._reading()
+
+    def keep(self, mask: np.ndarray) -> None:
+        """Go on with the active robots that `mask` `(active,)` names."""
+        self._active = self._active[mask]
+
+    def poses(self) -> np.ndarray:
+        """Where the active robots are, `(active, 3)`: x, y [m], yaw [rad]."""
+        return self.scene.poses(self._qpos[self._active])
+
+    def _reading(self) -> Reading:
+        return self.scene.reading(self._sensordata[self._active])

@@ -1,0 +1,140 @@
+"""Starts: where in an arena of any shape a robot may be put.
+
+Free means that the shell keeps a clearance to everything it can hit; inside means
+that the robot could not be pushed from there to the outside of the walls.
+"""
+
+import copy
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from scipy import ndimage
+
+from epuck_mj.errors import UserError
+from epuck_mj.model import ROBOT_BODY, SHELL, Scene
+
+NODES_MAX = 400
+"""Most grid nodes along one side of the arena."""
+
+SPACING_MIN = 0.01
+"""Grid spacing [m], unless the arena is larger than NODES_MAX of it."""
+
+BLOCK = 64
+"""Candidates drawn at once; part of what a seed means."""
+
+BLOCKS_MAX = 1000
+"""Blocks drawn before giving up."""
+
+
+class FreeSpace:
+    """The poses of a scene where a robot may start."""
+
+    def __init__(self, scene: Scene, clearance: float):
+        """Find the free space, on a grid first.
+
+        Args:
+          scene: robot and arena.
+          clearance: least distance from the shell to anything it can hit [m].
+
+        Raises:
+          UserError: if no walls, no room or no inside is there.
+        """
+        self._scene = scene
+        self._model = _with_margin(scene.model, clearance)
+        self._checks = Batch(self._model, BLOCK, 1)
+        self.lower, self.upper = self._bounds()
+        # one shell's width of outside all around
+        border = 2 * scene.model.geom(SHELL).rbound.item() + clearance
+        size = self.upper - self.lower + 2 * border
+        self.spacing = max(SPACING_MIN, size.max() / NODES_MAX)
+        self.origin = self.lower - border
+        nodes = np.ceil(size / self.spacing).astype(int) + 1
+        self.inside = self._inside((int(nodes[0]), int(nodes[1])))
+
+    def sample(self, rng: np.random.Generator, n: int) -> np.ndarray:
+        """Uniform random starts `(n, 3)`: x, y [m], yaw [rad].
+
+        Raises:
+          UserError: if the free space is too small to be hit.
+        """
+        starts = np.zeros((0, 3))
+        for _ in range(BLOCKS_MAX):
+            draws = rng.random((BLOCK, 3))
+            poses = np.empty_like(draws)
+            poses[:, :2] = self.lower + draws[:, :2] * (self.upper - self.lower)
+            poses[:, 2] = np.pi * (2 * draws[:, 2] - 1)
+            poses = poses[self._near_inside(poses[:, :2])]
+            poses = poses[_free(self._checks, self._scene, poses)]
+            starts = np.concatenate([starts, poses])[:n]
+            if len(starts) == n:
+                return starts
+        raise UserError(
+            f"arena '{self._scene.arena}' has almost no room for a start: "
+            f"{len(starts)} of {n} found among {BLOCK * BLOCKS_MAX} candidates"
+        )
+
+    def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners of the rectangle around all walls, x and y [m]."""
+        model = self._model
+        shell = model.geom(SHELL)
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        hits = (model.geom_contype & shell.conaffinity) | (
+            model.geom_conaffinity & shell.contype
+        )
+        wall = (hits != 0) & (model.geom_bodyid == 0)
+        wall &= model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
+        if not wall.any():
+            raise UserError(
+                f"arena '{self._scene.arena}' has no walls: expected geoms of the "
+                "world body that the robot's shell can hit"
+            )
+        rotation = data.geom_xmat[wall].reshape(-1, 3, 3)
+        box = model.geom_aabb[wall]
+        center = data.geom_xpos[wall] + np.einsum("nij,nj->ni", rotation, box[:, :3])
+        half = np.einsum("nij,nj->ni", np.abs(rotation), box[:, 3:])
+        return (center - half).min(axis=0)[:2], (center + half).max(axis=0)[:2]
+
+    def _inside(self, shape: tuple[int, int]) -> np.ndarray:
+        """Which grid nodes are free and enclosed by walls, `shape`."""
+        poses = np.zeros((shape[0] * shape[1], 3))
+        poses[:, :2] = self.origin + self.spacing * (np.indices(shape).reshape(2, -1).T)
+        checks = Batch(self._model, len(poses), 0)
+        free = _free(checks, self._scene, poses).reshape(shape)
+        parts = np.empty(shape, np.int32)
+        ndimage.label(free, output=parts)
+        edge = np.concatenate([parts[0], parts[-1], parts[:, 0], parts[:, -1]])
+        inside = free & ~np.isin(parts, edge)
+        if not inside.any():
+            raise UserError(
+                f"arena '{self._scene.arena}' has no room for a start: its walls "
+                "leave no enclosed space where the robot keeps its start clearance"
+            )
+        return inside
+
+    def _near_inside(self, points: np.ndarray) -> np.ndarray:
+        """Whether one of the four nodes around each point `(n, 2)` is inside."""
+        low = np.floor((points - self.origin) / self.spacing).astype(int)
+        near = np.zeros(len(points), bool)
+        for corner in np.ndindex(2, 2):
+            near |= self.inside[tuple((low + corner).T)]
+        return near
+
+
+def _with_margin(model: mujoco.MjModel, clearance: float) -> mujoco.MjModel:
+    """The model with a shell that already touches at that clearance [m]."""
+    model = copy.copy(model)
+    model.geom_margin[model.geom(SHELL).id] = clearance
+    model.body_margin[model.body(ROBOT_BODY).id] = clearance
+    return model
+
+
+def _free(checks: Batch, scene: Scene, poses: np.ndarray) -> np.ndarray:
+    """Whether the shell touches nothing on each pose `(n, 3)`, `(n,)`."""
+    ids = np.arange(len(poses), dtype=np.int32)
+    checks.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+    checks.bind("qpos")[ids] = scene.qpos(poses)
+    sensordata = checks.bind("sensordata")
+    checks.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)
+    return ~scene.reading(sensordata[ids]).contact

@@ -1,0 +1,39 @@
+"""A wall follower written by hand: a yardstick that owes nothing to evolution.
+
+It keeps walls on its right. Its few numbers were chosen by hand in the paper's arena.
+"""
+
+import numpy as np
+
+BEHIND, RIGHT, RIGHT_DIAGONAL = 3, 2, 1
+AHEAD = (0, 6, 7)
+"""Front right, left diagonal, front left."""
+
+CLEAR_AHEAD = 0.85
+"""Observation below which something stands in the way."""
+
+TARGET = 0.6
+"""Right-diagonal observation to keep: about 9 mm off the wall, driving along it."""
+
+GAIN = 0.8
+TURN_MAX = 0.25
+
+
+class WallFollower:
+    """A policy without weights or memory; a batch policy of any size as well."""
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """Actions `(..., 2)` for observations `(..., 8)`."""
+        blocked = observation[..., AHEAD].min(axis=-1) < CLEAR_AHEAD
+        side = observation[..., (RIGHT_DIAGONAL, RIGHT, BEHIND)].min(axis=-1)
+        turn = np.clip(
+            GAIN * (observation[..., RIGHT_DIAGONAL] - TARGET), -TURN_MAX, TURN_MAX
+        )
+        # straight on where no wall is; on the spot to the left where one blocks
+        turn = np.where(side < 1, turn, 0.0)
+        forward = np.where(blocked, 0.0, 1.0)
+        return np.stack([forward, np.where(blocked, -1.0, turn)], axis=-1)
+
+    def __getitem__(self, index: object) -> "WallFollower":
+        """Itself: all members of the batch are alike."""
+        return self
