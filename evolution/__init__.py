@@ -1,0 +1,1 @@
+"""Evolve controllers for the e-puck: optimisers, experiments, command lines."""

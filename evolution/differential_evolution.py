@@ -1,0 +1,253 @@
+"""Differential evolution, DE/best/1/bin and DE/rand/1/bin, synchronous and maximising.
+
+The whole new generation is built from the old one (Algorithm 1 of the paper): each
+individual x gets one trial y, crossed with a mutant u, and is replaced iff
+f(y) > f(x). A tie keeps the parent. Randomness is drawn in this order: the initial
+population, then for each generation the parents, the crossover, the bounds rule.
+
+Source:
+    Algorithm 1 and equation (1) of the paper; the names of the strategies are those of
+    Storn and Price, J. Global Optimization 11 (1997) 341-359. What happens to a trial
+    outside the bounds is not said there: see `evolution/bounds.py`.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike
+
+from evolution.ask_tell import (
+    SearchSpace,
+    checked_fitness,
+    checked_state,
+    generator_state,
+    pending,
+    read_only,
+    refuse_pending,
+    restored_generator,
+)
+from evolution.bounds import BOUNDS_RULES
+
+# i and three more, all distinct; both strategies draw the same three.
+MIN_POPULATION = 4
+
+
+def distinct_parents(population: int, rng: Generator) -> np.ndarray:
+    """Indices r1, r2, r3 `(population, 3)`, distinct in a row and not the row's own.
+
+    Every such triple is equally likely.
+    """
+    # Ranking random keys shuffles each row; a row's own index is put last.
+    keys = rng.random((population, population))
+    np.fill_diagonal(keys, np.inf)
+    return np.argsort(keys, axis=1)[:, :3]
+
+
+def rand_1(
+    genomes: np.ndarray, best: int, parents: np.ndarray, scale: float
+) -> np.ndarray:
+    """Mutants of DE/rand/1: u = x_r1 + F (x_r2 - x_r3), equation (1)."""
+    r1, r2, r3 = parents.T
+    return genomes[r1] + scale * (genomes[r2] - genomes[r3])
+
+
+def best_1(
+    genomes: np.ndarray, best: int, parents: np.ndarray, scale: float
+) -> np.ndarray:
+    """Mutants of DE/best/1: equation (1) with the best individual as r1.
+
+    As usual, r2 or r3 may be the best too, and the best is also a base for itself.
+    """
+    _, r2, r3 = parents.T
+    return genomes[best] + scale * (genomes[r2] - genomes[r3])
+
+
+Strategy = Callable[[np.ndarray, int, np.ndarray, float], np.ndarray]
+# (genomes (population, genes), best, parents (population, 3), F) -> mutants
+STRATEGIES: Mapping[str, Strategy] = {"best": best_1, "rand": rand_1}
+
+
+def binomial_crossover(
+    parents: np.ndarray, mutants: np.ndarray, crossover: float, rng: Generator
+) -> np.ndarray:
+    """Trials `(population, genes)`: mutant where rand_j < CR or j = R, else parent.
+
+    Args:
+        parents: `(population, genes)`.
+        mutants: `(population, genes)`.
+        crossover: CR; 0 takes the one gene R from the mutant, 1 takes all.
+        rng: draws R `(population,)`, then rand `(population, genes)`.
+    """
+    population, genes = parents.shape
+    forced = rng.integers(genes, size=population)
+    from_mutant = rng.random((population, genes)) < crossover
+    from_mutant[np.arange(population), forced] = True
+    return np.where(from_mutant, mutants, parents)
+
+
+@dataclass(frozen=True)
+class DifferentialEvolutionParameters:
+    """What a differential evolution is made of.
+
+    Attributes:
+        strategy: best or rand: which individual is the base of a mutant.
+        population: number of individuals N, at least 4.
+        scale: F in [0, 2], the differential weight.
+        crossover: CR in [0, 1], the probability that a gene comes from the mutant.
+        bounds_rule: midpoint, none, clip, reflect or reinit: where a gene outside the
+            bounds goes.
+        reevaluate_parents: ask parents and trials together from the second generation
+            on, and compare and store fresh fitness only. A generation then costs 2 N.
+        algorithm: what it is, for configurations.
+
+    Raises:
+        ValueError: a value out of its range or an unknown name.
+    """
+
+    strategy: str
+    population: int
+    scale: float
+    crossover: float
+    bounds_rule: str = "midpoint"
+    reevaluate_parents: bool = False
+    algorithm: Literal["differential_evolution"] = "differential_evolution"
+    # read by the configuration: a misspelt key is refused
+    __pydantic_config__: ClassVar = {"extra": "forbid"}
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        if self.strategy not in STRATEGIES:
+            raise ValueError(
+                f"unknown strategy {self.strategy!r}; "
+                f"available: {', '.join(STRATEGIES)}"
+            )
+        if self.population < MIN_POPULATION:
+            raise ValueError(
+                f"population: expected at least {MIN_POPULATION} for distinct parents, "
+                f"got {self.population}"
+            )
+        if not 0 <= self.scale <= 2:
+            raise ValueError(f"scale (F): expected 0 to 2, got {self.scale}")
+        if not 0 <= self.crossover <= 1:
+            raise ValueError(f"crossover (CR): expected 0 to 1, got {self.crossover}")
+        if self.bounds_rule not in BOUNDS_RULES:
+            raise ValueError(
+                f"unknown bounds rule {self.bounds_rule!r}; "
+                f"available: {', '.join(BOUNDS_RULES)}"
+            )
+
+
+class DifferentialEvolution:
+    """An `Optimizer`, 'de-best' or 'de-rand', whose attributes are documented there.
+
+    Its population are the survivors. Without `reevaluate_parents` their stored fitness
+    is for ever the one that let them in.
+    """
+
+    def __init__(
+        self,
+        parameters: DifferentialEvolutionParameters,
+        space: SearchSpace,
+        rng: Generator,
+    ) -> None:
+        """Draw the initial population; `rng` belongs to the optimiser from here on."""
+        self._parameters = parameters
+        self._space = space
+        self._rng = rng
+        self._asked: np.ndarray | None = None
+        shape = (parameters.population, space.genes)
+        self.name = f"de-{parameters.strategy}"
+        self.population = read_only(
+            rng.uniform(space.init_lower, space.init_upper, size=shape)
+        )
+        self.fitness = read_only(np.full(parameters.population, -np.inf))
+        self.generation = 0
+
+    def next_size(self) -> int:
+        """Number of genomes the next ask returns."""
+        reevaluated = self._parameters.reevaluate_parents and self.generation > 0
+        return self._parameters.population * (2 if reevaluated else 1)
+
+    def ask(self) -> np.ndarray:
+        """Genomes to evaluate `(next_size(), genes)`, the caller's to keep.
+
+        The initial population; later the trials, after their parents if those are
+        re-evaluated.
+
+        Raises:
+            AskTellError: the last genomes have not been told.
+        """
+        refuse_pending(self._asked, "ask")
+        if self.generation == 0:
+            asked = self.population
+        elif self._parameters.reevaluate_parents:
+            asked = np.concatenate([self.population, self._trials()])
+        else:
+            asked = self._trials()
+        self._asked = asked
+        return asked.copy()
+
+    def tell(self, fitness: ArrayLike) -> None:
+        """Let each trial replace its parent if it is strictly better.
+
+        Args:
+            fitness: of the genomes asked, in their order `(n,)`; NaN counts as -inf.
+
+        Raises:
+            AskTellError: nothing was asked, or another shape was expected.
+        """
+        asked = pending(self._asked)
+        told = checked_fitness(fitness, len(asked))
+        n = self._parameters.population
+        if self.generation == 0:
+            self.fitness = read_only(told)
+        else:
+            # Survivors carry the fitness they were compared with.
+            reevaluated = self._parameters.reevaluate_parents
+            parent_fitness = told[:n] if reevaluated else self.fitness
+            trials, trial_fitness = asked[-n:], told[-n:]
+            accepted = trial_fitness > parent_fitness
+            self.population = read_only(
+                np.where(accepted[:, np.newaxis], trials, self.population)
+            )
+            self.fitness = read_only(np.where(accepted, trial_fitness, parent_fitness))
+        self.generation += 1
+        self._asked = None
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything the next generations depend on; see `Optimizer.state`."""
+        refuse_pending(self._asked, "take the state")
+        return self._arrays()
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Go on where `state` was taken; see `Optimizer.restore`."""
+        arrays = checked_state(state, like=self._arrays())
+        self._rng = restored_generator(self._rng, arrays["generator"])
+        self.population = read_only(arrays["population"])
+        self.fitness = read_only(arrays["fitness"])
+        self.generation = int(arrays["generation"])
+        self._asked = None
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return {
+            "name": np.array(self.name),
+            "generation": np.array(self.generation),
+            "population": self.population.copy(),
+            "fitness": self.fitness.copy(),
+            "generator": generator_state(self._rng),
+        }
+
+    def _trials(self) -> np.ndarray:
+        """One trial for each individual `(population, genes)`."""
+        parameters, space, genomes = self._parameters, self._space, self.population
+        parents = distinct_parents(len(genomes), self._rng)
+        # On ties the first is the best.
+        best = int(np.argmax(self.fitness))
+        mutate = STRATEGIES[parameters.strategy]
+        mutants = mutate(genomes, best, parents, parameters.scale)
+        trials = binomial_crossover(genomes, mutants, parameters.crossover, self._rng)
+        keep_inside = BOUNDS_RULES[parameters.bounds_rule]
+        return keep_inside(trials, genomes, space.lower, space.upper, self._rng)
