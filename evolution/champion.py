@@ -1,0 +1,113 @@
+"""Champion: the best of a run by fresh starts, not by what the run believes.
+
+An optimiser that never re-evaluates keeps its luckiest draws. So the candidates are
+compared on validation starts and the winner is reported on test starts; both sets are
+fixed, the same for all runs, and never used in evolution.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from epuck_mj.controller import Network
+from epuck_mj.starts import FreeSpace
+from evolution.evaluation import Engine, evaluate
+from evolution.experiment import Experiment, Purpose, random_generator
+
+HELD_OUT_SEED = 0
+"""Seed of validation and test starts: no run's seed reaches their streams."""
+
+N_VALIDATION = 200
+N_TEST = 200
+
+BEST_OF_POPULATION = 0.1
+"""Share of the final population that are candidates."""
+
+LATEST_BEST = 20
+"""Latest entries of the run's best-so-far list that are candidates."""
+
+
+def starts_for_validation(space: FreeSpace) -> np.ndarray:
+    """The starts on which champions are chosen, `(200, 3)`."""
+    rng = random_generator(HELD_OUT_SEED, Purpose.VALIDATION)
+    return space.sample(rng, N_VALIDATION)
+
+
+def starts_for_test(space: FreeSpace) -> np.ndarray:
+    """The starts on which champions are reported, `(200, 3)`."""
+    return space.sample(random_generator(HELD_OUT_SEED, Purpose.TEST), N_TEST)
+
+
+@dataclass(frozen=True)
+class Champion:
+    """The winner of a run.
+
+    Attributes:
+      genome: its weights, `(genes,)`.
+      stored_fitness: what evolution believed of it.
+      validation_fitness: its mean on the validation starts.
+    """
+
+    genome: np.ndarray
+    stored_fitness: float
+    validation_fitness: float
+
+
+def candidates(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
+    """Genomes `(n, genes)` that may be champion and their stored fitness `(n,)`."""
+    population, fitness = experiment.optimizer.population, experiment.optimizer.fitness
+    n_best = max(1, round(BEST_OF_POPULATION * len(population)))
+    order = np.argsort(-fitness, kind="stable")[:n_best]
+    # the generations that raised the run's best
+    best = np.array([record.best for record in experiment.records])
+    before = np.concatenate([[-np.inf], np.maximum.accumulate(best)[:-1]])
+    raised = np.flatnonzero(best > before)[-LATEST_BEST:]
+    genomes = [population[order], np.array(experiment.best_genomes)[raised]]
+    genomes, stored = (
+        np.concatenate(genomes),
+        np.concatenate([fitness[order], best[raised]]),
+    )
+    _, first = np.unique(genomes, axis=0, return_index=True)
+    first.sort()
+    return genomes[first], stored[first]
+
+
+def choose_champion(engine: Engine, experiment: Experiment) -> Champion:
+    """The candidate with the highest mean on the validation starts."""
+    genomes, stored = candidates(experiment)
+    starts = starts_for_validation(experiment.space)
+    network = experiment.config.network
+    fitness = evaluate(engine, network, genomes, starts).fitness
+    best = int(fitness.argmax())
+    return Champion(genomes[best], float(stored[best]), float(fitness[best]))
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """A champion on the test starts.
+
+    Attributes:
+      mean: fitness over the starts.
+      standard_error: of that mean.
+      crash_rate: share of the trials that ended in a crash.
+      starts: how many there were.
+    """
+
+    mean: float
+    standard_error: float
+    crash_rate: float
+    starts: int
+
+
+def held_out(
+    engine: Engine, network: Network, genome: np.ndarray, starts: np.ndarray
+) -> HeldOut:
+    """What fresh starts `(n, 3)` say of a genome `(genes,)`."""
+    evaluation = evaluate(engine, network, genome[None], starts)
+    fitness = evaluation.trial_fitness[0]
+    return HeldOut(
+        mean=float(fitness.mean()),
+        standard_error=float(fitness.std(ddof=1) / np.sqrt(fitness.size)),
+        crash_rate=float(evaluation.crashed.mean()),
+        starts=fitness.size,
+    )

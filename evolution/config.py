@@ -1,0 +1,189 @@
+"""What an experiment is: typed, frozen, read from YAML, unknown keys refused."""
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
+
+from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
+from epuck_mj.control import TaskParameters
+from epuck_mj.controller import Network
+from epuck_mj.errors import UserError
+from epuck_mj.motors import Speeds
+from epuck_mj.tasks import START_CLEARANCE
+from evolution.optimizer import (
+    DifferentialEvolutionParameters,
+    GeneticAlgorithmParameters,
+    SearchSpace,
+)
+
+CONFIGS = Path(__file__).resolve().parent / "configs"
+DEFAULT_EXPERIMENT = "de-best"
+
+
+def _algorithm(value: Any) -> Any:
+    """The tag that says which optimiser's parameters `value` holds."""
+    if isinstance(value, dict):
+        return value.get("algorithm")
+    return getattr(value, "algorithm", None)
+
+
+OptimizerConfig = Annotated[
+    Annotated[DifferentialEvolutionParameters, Tag("differential_evolution")]
+    | Annotated[GeneticAlgorithmParameters, Tag("genetic_algorithm")],
+    Discriminator(
+        _algorithm,
+        custom_error_type="unknown_algorithm",
+        custom_error_message=(
+            "expected a mapping with 'algorithm', one of differential_evolution, "
+            "genetic_algorithm"
+        ),
+    ),
+]
+
+
+class ExperimentConfig(BaseModel):
+    """One run of evolution, but for how it is carried out (threads, engine, output)."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=False, allow_inf_nan=False
+    )
+
+    seed: int = Field(1, ge=0, description="seed of everything random")
+    evaluations: int = Field(
+        30_000, ge=1, description="budget: individuals evaluated, whole generations"
+    )
+    robot: str = Field(
+        "epuck_planar", description="epuck_planar, epuck (wheels) or an MJCF file"
+    )
+    arena: str = Field("arena", description="name of a shipped arena or an MJCF file")
+    trials: int = Field(5, ge=1, description="trials of an individual")
+    steps: int = Field(300, ge=1, description="control steps of a trial")
+    control_step: float = Field(0.1, gt=0, description="control step [s]")
+    fitness: Literal["product", "literal"] = Field(
+        "product", description="step fitness: the paper's prose or its equation (2)"
+    )
+    v_max: float = Field(SPEED_MAX, gt=0, description="forward speed at v = 1 [m/s]")
+    w_max: float = Field(TURN_RATE_MAX, gt=0, description="yaw rate at w = 1 [rad/s]")
+    sensor_range: float = Field(
+        PROXIMITY_RANGE, gt=0, description="range of the proximity sensors [m]"
+    )
+    start_clearance: float = Field(
+        START_CLEARANCE, gt=0, description="least distance to a wall at a start [m]"
+    )
+    hidden: int = Field(4, ge=1, description="hidden neurons")
+    biases: bool = Field(False, description="give hidden and output neurons a bias")
+    weight_bound: float = Field(5.0, gt=0, description="weights stay within +- this")
+    weight_init: float = Field(
+        5.0, gt=0, description="first weights are uniform within +- this"
+    )
+    optimizer: OptimizerConfig
+
+    @property
+    def task(self) -> TaskParameters:
+        """What a trial is."""
+        return TaskParameters(
+            steps=self.steps,
+            control_step=self.control_step,
+            fitness=self.fitness,
+            sensor_range=self.sensor_range,
+            speeds=Speeds(self.v_max, self.w_max),
+        )
+
+    @property
+    def network(self) -> Network:
+        """Shape of the controllers."""
+        return Network(self.hidden, self.biases)
+
+    @property
+    def search_space(self) -> SearchSpace:
+        """Where genomes may be."""
+        return SearchSpace(
+            genes=self.network.n_genes,
+            lower=-self.weight_bound,
+            upper=self.weight_bound,
+            init_lower=-self.weight_init,
+            init_upper=self.weight_init,
+        )
+
+    def to_yaml(self) -> str:
+        """The resolved config: every key, in the order above."""
+        return yaml.safe_dump(self.model_dump(), sort_keys=False)
+
+
+def find_config(experiment: str) -> Path:
+    """The file of a shipped experiment, or the user's own.
+
+    Raises:
+      UserError: if there is none.
+    """
+    shipped = {path.stem: path for path in sorted(CONFIGS.glob("*.yaml"))}
+    path = shipped.get(experiment, Path(experiment))
+    if path.is_file():
+        return path
+    raise UserError(
+        f"no experiment '{experiment}': expected the path of a YAML file or one of "
+        + ", ".join(shipped)
+    )
+
+
+def load_config(path: Path) -> ExperimentConfig:
+    """Read an experiment.
+
+    Raises:
+      UserError: if the file is missing, not YAML, or says something unknown.
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(f"cannot read '{path}': {error}") from None
+    except yaml.YAMLError as error:
+        raise UserError(f"'{path}' is not YAML: {' '.join(str(error).split())}") from (
+            None
+        )
+    if not isinstance(content, dict):
+        raise UserError(
+            f"'{path}': expected a mapping of keys to values, "
+            f"got {type(content).__name__}"
+        )
+    try:
+        return ExperimentConfig.model_validate(content)
+    except ValidationError as error:
+        raise UserError(f"'{path}': {one_line(error)}") from None
+
+
+def one_line(error: ValidationError) -> str:
+    """Everything a config got wrong, with the keys there are when one is unknown."""
+    parts = []
+    for detail in error.errors():
+        key = ".".join(str(part) for part in detail["loc"] if part not in _TAGS)
+        if detail["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+            available = ", ".join(_keys(detail["loc"]))
+            parts.append(f"unknown key '{key}'; available: {available}")
+        elif detail["type"] == "missing":
+            parts.append(f"key '{key}' is missing")
+        else:
+            message = detail["msg"].removeprefix("Value error, ")
+            parts.append(f"{key}: {message}, got {_shown(detail['input'])}")
+    return "; ".join(parts)
+
+
+_TAGS = ("differential_evolution", "genetic_algorithm")
+
+
+def _keys(loc: tuple[int | str, ...]) -> list[str]:
+    """The keys that could stand where the unknown key at `loc` stands."""
+    if len(loc) == 1:
+        return list(ExperimentConfig.model_fields)
+    kinds = {
+        "differential_evolution": DifferentialEvolutionParameters,
+        "genetic_algorithm": GeneticAlgorithmParameters,
+    }
+    return [field.name for field in fields(kinds[str(loc[1])])]
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) < 60 else f"{text[:57]}..."

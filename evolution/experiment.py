@@ -1,0 +1,189 @@
+"""The generation loop: ask, evaluate, tell, and a record of each round.
+
+Consumers (progress, checkpoints, figures) read the records and cannot change the
+result. Randomness is keyed by what it is for: `random_generator(seed, purpose, ...)`.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import astuple, dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from epuck_mj.errors import UserError
+from epuck_mj.model import Scene, load_scene
+from epuck_mj.starts import FreeSpace
+from evolution.config import ExperimentConfig
+from evolution.evaluation import BatchEngine, DmControlEngine, Engine, evaluate
+from evolution.optimizer import Optimizer, make_optimizer
+
+ENGINES = ("batch", "dm_control")
+
+
+class Purpose(IntEnum):
+    """What randomness is for: streams of one seed that never meet."""
+
+    SEARCH = 0
+    STARTS = 1
+    VALIDATION = 2
+    TEST = 3
+    SHOW = 4
+
+
+def random_generator(seed: int, *key: int) -> np.random.Generator:
+    """The stream of `seed` for a purpose and, behind it, whatever it depends on."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
+
+
+@dataclass(frozen=True)
+class Record:
+    """One generation, as in history.csv.
+
+    Attributes:
+      generation: counted from 0, the initial population.
+      evaluations: individuals evaluated so far.
+      best: highest stored fitness of the population.
+      mean: mean stored fitness of the population.
+      std: its standard deviation.
+      crash_rate: share of this generation's trials that ended in a crash.
+    """
+
+    generation: int
+    evaluations: int
+    best: float
+    mean: float
+    std: float
+    crash_rate: float
+
+
+HISTORY_HEADER = ",".join(Record.__dataclass_fields__)
+
+
+class Experiment:
+    """A run of evolution that can be stopped and resumed between generations."""
+
+    def __init__(
+        self, config: ExperimentConfig, engine: str = "batch", threads: int = 0
+    ):
+        """Load the scene and draw the first population.
+
+        Args:
+          config: what to do.
+          engine: one of `ENGINES`: how trials are stepped, not what they give.
+          threads: of the batch engine; 0 is one per core.
+
+        Raises:
+          UserError: if robot or arena cannot be used, or the budget is too small.
+        """
+        self.config = config
+        self.scene = load_scene(config.robot, config.arena, config.control_step)
+        self.space = FreeSpace(self.scene, config.start_clearance)
+        self.engine = make_engine(engine, self.scene, config, threads)
+        self.optimizer = _optimizer(config)
+        self.records: list[Record] = []
+        self.best_genomes: list[np.ndarray] = []
+        """Best individual of the population after each generation, `(genes,)`."""
+        if self.optimizer.next_size() > config.evaluations:
+            raise UserError(
+                f"expected a budget of at least one generation, "
+                f"{self.optimizer.next_size()} evaluations, got {config.evaluations}"
+            )
+
+    @property
+    def evaluations(self) -> int:
+        """Individuals evaluated so far."""
+        return self.records[-1].evaluations if self.records else 0
+
+    @property
+    def finished(self) -> bool:
+        """Whether the budget has no room for another generation."""
+        size = self.optimizer.next_size()
+        return self.evaluations + size > self.config.evaluations
+
+    def run(self) -> Iterator[Record]:
+        """Evolve until the budget is spent; one record per generation."""
+        while not self.finished:
+            yield self._generation()
+
+    def _generation(self) -> Record:
+        config = self.config
+        generation = self.optimizer.generation
+        # the same starts for every individual, and for every algorithm of that seed
+        rng = random_generator(config.seed, Purpose.STARTS, generation)
+        starts = self.space.sample(rng, config.trials)
+        genomes = self.optimizer.ask()
+        evaluation = evaluate(self.engine, config.network, genomes, starts)
+        self.optimizer.tell(evaluation.fitness)
+        fitness = self.optimizer.fitness
+        record = Record(
+            generation=generation,
+            evaluations=self.evaluations + len(genomes),
+            best=float(fitness.max()),
+            mean=float(fitness.mean()),
+            std=float(fitness.std()),
+            crash_rate=float(evaluation.crashed.mean()),
+        )
+        self.records.append(record)
+        self.best_genomes.append(self.optimizer.population[fitness.argmax()].copy())
+        return record
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything that the next generations depend on, and what has been so far."""
+        optimizer = self.optimizer.state()
+        return {
+            "records": np.array([astuple(record) for record in self.records]),
+            "best_genomes": np.array(self.best_genomes),
+            **{f"optimizer.{name}": array for name, array in optimizer.items()},
+        }
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Go on from a `state`.
+
+        Raises:
+          ValueError: if it does not belong to this experiment.
+        """
+        prefix = "optimizer."
+        for name in ("records", "best_genomes"):
+            if name not in state:
+                raise ValueError(f"expected an array '{name}', got {', '.join(state)}")
+        self.optimizer.restore(
+            {
+                name.removeprefix(prefix): array
+                for name, array in state.items()
+                if name.startswith(prefix)
+            }
+        )
+        self.records = [
+            Record(int(generation), int(evaluations), *map(float, rest))
+            for generation, evaluations, *rest in state["records"]
+        ]
+        self.best_genomes = list(state["best_genomes"])
+
+    def history(self) -> str:
+        """Text of history.csv: no clock in it, floats that read back exactly."""
+        rows = [",".join(map(repr, astuple(record))) for record in self.records]
+        return "\n".join([HISTORY_HEADER, *rows]) + "\n"
+
+
+def _optimizer(config: ExperimentConfig) -> Optimizer:
+    """The optimiser at generation 0."""
+    rng = random_generator(config.seed, Purpose.SEARCH)
+    try:
+        return make_optimizer(config.optimizer, config.search_space, rng)
+    except ValueError as error:
+        raise UserError(str(error)) from None
+
+
+def make_engine(
+    name: str, scene: Scene, config: ExperimentConfig, threads: int
+) -> Engine:
+    """The engine of that name.
+
+    Raises:
+      UserError: if there is none.
+    """
+    if name == "batch":
+        return BatchEngine(scene, config.task, threads)
+    if name == "dm_control":
+        return DmControlEngine(scene, config.task)
+    raise UserError(f"unknown engine '{name}'; available: {', '.join(ENGINES)}")

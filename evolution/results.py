@@ -1,0 +1,141 @@
+"""What a finished run shows: its champion, judged by fresh starts, drawn and logged."""
+
+from dataclasses import asdict
+
+from epuck_mj import files
+from epuck_mj.controller import ControllerFile
+from epuck_mj.model import Scene, load_scene
+from epuck_mj.recording import save_recording
+from epuck_mj.starts import FreeSpace
+from epuck_mj.trajectory import record
+from evolution.champion import Champion, HeldOut, choose_champion, held_out
+from evolution.champion import starts_for_test as test_starts
+from evolution.evaluation import BatchEngine
+from evolution.experiment import Experiment
+from evolution.figures import fitness_figure, save_figure, trajectory_figure
+from evolution.run_directory import RunDirectory
+
+WHEELED_ROBOT = "epuck"
+"""Every champion is reported on this robot, whatever it was evolved on."""
+
+N_SHOWN = 4
+"""Trials of the champion in the picture; the first is also the recording."""
+
+
+def write_results(
+    experiment: Experiment, directory: RunDirectory, threads: int = 0
+) -> ControllerFile:
+    """Choose the champion, test it, and write everything that shows it.
+
+    Args:
+      experiment: a finished run.
+      directory: where to write.
+      threads: that step the robots; 0 is one per core.
+
+    Returns:
+      The champion as written, with its scores.
+    """
+    config = experiment.config
+    champion = choose_champion(
+        BatchEngine(experiment.scene, config.task, threads), experiment
+    )
+    scenes = {config.robot: experiment.scene}
+    if config.robot != WHEELED_ROBOT:
+        scenes[WHEELED_ROBOT] = load_scene(
+            WHEELED_ROBOT, config.arena, config.control_step
+        )
+    starts = {
+        robot: test_starts(FreeSpace(scene, config.start_clearance))
+        for robot, scene in scenes.items()
+    }
+    tests = {
+        robot: held_out(
+            BatchEngine(scene, config.task, threads),
+            config.network,
+            champion.genome,
+            starts[robot],
+        )
+        for robot, scene in scenes.items()
+    }
+    controller = _controller_file(experiment, champion, tests)
+    files.write_text(directory.champion, controller.to_json())
+    _draw_fitness(experiment, directory)
+    wheeled = scenes[WHEELED_ROBOT]
+    _show(experiment, directory, controller, wheeled, starts[WHEELED_ROBOT][:N_SHOWN])
+    return controller
+
+
+def summary(controller: ControllerFile) -> str:
+    """Stored and held-out fitness side by side, in plain words."""
+    scores, steps = controller.scores, controller.task["steps"]
+    lines = [
+        f"Held-out fitness on {test['starts']} fresh starts, {robot}: "
+        f"{test['mean']:.1f} +- {test['standard_error']:.1f} of {steps}, "
+        f"{test['crash_rate']:.0%} of the trials crash"
+        for robot, test in scores["held_out"].items()
+    ]
+    lines.append(
+        f"Stored fitness {scores['stored']:.1f} of {steps}: what evolution believes"
+    )
+    return "\n".join(lines)
+
+
+def _controller_file(
+    experiment: Experiment, champion: Champion, tests: dict[str, HeldOut]
+) -> ControllerFile:
+    config = experiment.config
+    return ControllerFile(
+        network=config.network,
+        genome=champion.genome,
+        task=asdict(config.task),
+        scene={
+            "robot": config.robot,
+            "arena": config.arena,
+            "mjcf_sha256": experiment.scene.hashes(),
+        },
+        scores={
+            "stored": champion.stored_fitness,
+            "validation": champion.validation_fitness,
+            "held_out": {robot: asdict(test) for robot, test in tests.items()},
+        },
+    )
+
+
+def _draw_fitness(experiment: Experiment, directory: RunDirectory) -> None:
+    records = experiment.records
+    figure = fitness_figure(
+        [record.evaluations for record in records],
+        [record.best for record in records],
+        [record.mean for record in records],
+        title=f"{experiment.optimizer.name}, seed {experiment.config.seed}",
+        steps=experiment.config.steps,
+    )
+    save_figure(figure, directory.fitness_figure)
+
+
+def _show(
+    experiment: Experiment,
+    directory: RunDirectory,
+    controller: ControllerFile,
+    scene: Scene,
+    starts,
+) -> None:
+    """Trials of the champion on the wheeled robot: picture, file and recording."""
+    task = experiment.config.task
+    trials = [record(scene, controller.controller, start, task) for start in starts]
+    titles = [
+        f"start {i}: fitness {trial.fitness.sum():.0f}"
+        for i, trial in enumerate(trials)
+    ]
+    save_figure(
+        trajectory_figure(scene, trials, task, titles), directory.trajectory_figure
+    )
+    trials[0].save(directory.trajectory)
+    save_recording(
+        directory.recording,
+        scene,
+        trials[0],
+        task,
+        title=f"{experiment.optimizer.name}, seed {experiment.config.seed}",
+        summary=summary(controller),
+    )

@@ -1,0 +1,179 @@
+"""Evolve a controller: `python -m evolution.run [EXPERIMENT] [options]`."""
+
+import argparse
+import signal
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+from epuck_mj.errors import UserError
+from evolution.command_line import command, main, parse
+from evolution.config import (
+    DEFAULT_EXPERIMENT,
+    ExperimentConfig,
+    find_config,
+    load_config,
+)
+from evolution.experiment import Experiment
+from evolution.progress import Progress
+from evolution.provenance import provenance
+from evolution.results import summary, write_results
+from evolution.run_directory import RunDirectory
+
+MODULE = "evolution.run"
+
+
+@dataclass(frozen=True)
+class Options:
+    """Evolve a controller for the e-puck and test its champion on fresh starts.
+
+    Attributes:
+        experiment: a shipped experiment (de-best, de-rand, ga) or a YAML file; it comes
+            first.
+        config: the experiment's keys; a flag wins over the YAML.
+        output: run directory, runs/<experiment>-seed-<seed> if not given.
+        resume: run directory to go on with.
+        threads: threads that step the robots; 0 is one per core. Changes no result.
+        engine: batch steps all robots at once, dm_control one trial after the other.
+            Changes no result.
+        print_config: print the resolved YAML and run nothing.
+    """
+
+    experiment: tyro.conf.Positional[str]
+    config: ExperimentConfig
+    output: Path | None = None
+    resume: Path | None = None
+    threads: int = 0
+    engine: Literal["batch", "dm_control"] = "batch"
+    print_config: bool = False
+
+
+def run(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status.
+
+    Raises:
+        UserError: for anything the user can put right.
+    """
+    options = _options(argv)
+    if options.print_config:
+        print(options.config.to_yaml(), end="")
+        return 0
+    if options.threads < 0:
+        raise UserError(f"expected threads of at least 0, got {options.threads}")
+    if options.resume is not None:
+        directory = RunDirectory(options.resume)
+        directory.refuse_other_config(options.config)
+        if directory.finished:
+            print(f"{directory.path} is finished; {_replay(directory)}")
+            return 0
+    else:
+        stem = Path(options.experiment).stem
+        default = Path("runs") / f"{stem}-seed-{options.config.seed}"
+        directory = RunDirectory(options.output or default)
+        directory.refuse_if_used()
+    experiment = Experiment(options.config, options.engine, options.threads)
+    source = provenance(experiment.scene, argv, options.engine, options.threads)
+    if options.resume is not None:
+        directory.restore(experiment, source)
+    else:
+        directory.create(options.config, source)
+    return _carry_out(experiment, directory, options.threads)
+
+
+def _options(argv: Sequence[str]) -> Options:
+    """The options, on top of the experiment or of the run to be resumed."""
+    first = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    first.add_argument("--resume", type=Path, nargs="?")
+    resume = first.parse_known_args(argv)[0].resume
+    named = bool(argv) and not argv[0].startswith("-")
+    experiment = argv[0] if named else DEFAULT_EXPERIMENT
+    if resume is not None and not named:
+        config = RunDirectory(resume).stored_config()
+    else:
+        config = load_config(find_config(experiment))
+    options = parse(Options(experiment, config), prog=f"python -m {MODULE}", argv=argv)
+    if options.experiment != experiment:
+        raise UserError(
+            f"the experiment comes first: {command(MODULE, options.experiment, '...')}"
+        )
+    if options.resume is not None and options.output is not None:
+        raise UserError("expected --resume or --output, got both")
+    return options
+
+
+def _carry_out(experiment: Experiment, directory: RunDirectory, threads: int) -> int:
+    """Evolve, then choose and show the champion; the exit status."""
+    started = time.monotonic()
+    try:
+        with _interruptible():
+            _evolve(experiment, directory)
+            controller = write_results(experiment, directory, threads)
+            directory.mark_finished()
+    except _Interrupted as interruption:
+        print(
+            f"Interrupted after {experiment.evaluations:,} evaluations; go on with: "
+            + command(MODULE, "--resume", directory.path),
+            file=sys.stderr,
+        )
+        return 128 + interruption.signum
+    minutes, seconds = divmod(round(time.monotonic() - started), 60)
+    print(
+        f"{experiment.optimizer.name}, seed {experiment.config.seed}: "
+        f"{experiment.evaluations:,} evaluations in {len(experiment.records)} "
+        f"generations, {minutes} min {seconds} s"
+    )
+    print(summary(controller))
+    print(f"Written to {directory.path}: {directory.contents()}")
+    print(_replay(directory))
+    return 0
+
+
+def _evolve(experiment: Experiment, directory: RunDirectory) -> None:
+    """Go through the generations that are left, saving each."""
+    with Progress(experiment.config.evaluations, experiment.evaluations) as progress:
+        before = time.monotonic()
+        for record in experiment.run():
+            after = time.monotonic()
+            directory.save(experiment, after - before)
+            progress.update(record)
+            before = after
+
+
+class _Interrupted(BaseException):
+    """Ctrl-C or SIGTERM; what is on disk can be resumed at any moment."""
+
+    def __init__(self, signum: int):
+        super().__init__(signum)
+        self.signum = signum
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Turn SIGINT and SIGTERM into `_Interrupted`, once; then let us end in peace."""
+    signums = (signal.SIGINT, signal.SIGTERM)
+
+    def interrupt(signum: int, frame: object) -> None:
+        for each in signums:
+            signal.signal(each, signal.SIG_IGN)
+        raise _Interrupted(signum)
+
+    previous = {signum: signal.signal(signum, interrupt) for signum in signums}
+    try:
+        yield
+    finally:
+        for signum, handler in previous.items():
+            signal.signal(signum, handler)
+
+
+def _replay(directory: RunDirectory) -> str:
+    return f"Replay: {command('rerun', directory.recording)}"
+
+
+if __name__ == "__main__":
+    main(run)

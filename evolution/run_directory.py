@@ -1,0 +1,155 @@
+"""The run directory: what a run leaves behind, and what it can be resumed from."""
+
+import json
+from pathlib import Path
+
+import yaml
+
+from epuck_mj import files
+from epuck_mj.errors import UserError
+from evolution.config import ExperimentConfig, load_config
+from evolution.experiment import Experiment
+from evolution.provenance import now, to_json
+
+
+class RunDirectory:
+    """One run's files; the checkpoint decides, everything else follows from it."""
+
+    def __init__(self, path: Path):
+        """Name the directory; nothing is touched yet."""
+        self.path = path
+        self.config = path / "config.yaml"
+        self.provenance = path / "provenance.json"
+        self.checkpoint = path / "checkpoint.npz"
+        self.history = path / "history.csv"
+        self.timing = path / "timing.csv"
+        self.champion = path / "champion.json"
+        self.fitness_figure = path / "fitness.png"
+        self.trajectory = path / "trajectory.npz"
+        self.trajectory_figure = path / "trajectory.png"
+        self.recording = path / "champion.rrd"
+
+    def refuse_if_used(self) -> None:
+        """Refuse a directory that holds anything.
+
+        Raises:
+          UserError: if it does, or is not a directory.
+        """
+        if self.path.exists() and not self.path.is_dir():
+            raise UserError(f"output '{self.path}' is not a directory")
+        if self.path.is_dir() and any(self.path.iterdir()):
+            raise UserError(
+                f"output '{self.path}' is not empty: expected a new directory, or "
+                f"--resume {self.path} to go on with what is there"
+            )
+
+    def create(self, config: ExperimentConfig, provenance: dict) -> None:
+        """Make the directory and write down what is about to happen.
+
+        Raises:
+          UserError: if it cannot be written.
+        """
+        self.refuse_if_used()
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            files.write_text(self.config, config.to_yaml())
+            files.write_text(self.provenance, to_json(provenance))
+        except OSError as error:
+            raise UserError(
+                f"cannot write output '{self.path}': {error.strerror}"
+            ) from None
+
+    def stored_config(self) -> ExperimentConfig:
+        """The config of the run that is there.
+
+        Raises:
+          UserError: if there is none.
+        """
+        if not self.config.is_file():
+            raise UserError(f"nothing to resume: no '{self.config}'")
+        return load_config(self.config)
+
+    def refuse_other_config(self, config: ExperimentConfig) -> None:
+        """Refuse to go on with a changed config.
+
+        Raises:
+          UserError: naming the keys that differ.
+        """
+        stored = _flat(self.stored_config())
+        asked = _flat(config)
+        differing = [
+            f"{key} (stored {stored.get(key)}, got {asked.get(key)})"
+            for key in dict.fromkeys([*stored, *asked])
+            if stored.get(key) != asked.get(key)
+        ]
+        if differing:
+            raise UserError(
+                f"cannot resume '{self.path}' with another config; these keys differ: "
+                + ", ".join(differing)
+            )
+
+    def restore(self, experiment: Experiment, provenance: dict) -> None:
+        """Put the experiment where the checkpoint is; at its start if there is none.
+
+        Raises:
+          UserError: if the checkpoint cannot be read or belongs to something else.
+        """
+        if self.checkpoint.exists():
+            state = files.read_arrays(self.checkpoint)
+            try:
+                experiment.restore(state)
+            except ValueError as error:
+                raise UserError(
+                    f"'{self.checkpoint}' is not a checkpoint of this run: {error}"
+                ) from None
+            # the run may have been killed between its two files
+            files.write_text(self.history, experiment.history())
+        first = self._stored_provenance() or provenance
+        resumed = [*first.get("resumed", ()), provenance]
+        files.write_text(self.provenance, to_json({**first, "resumed": resumed}))
+
+    def save(self, experiment: Experiment, seconds: float) -> None:
+        """Checkpoint, then what can be derived from it; `seconds` of this generation.
+
+        Raises:
+          UserError: if the directory can no longer be written.
+        """
+        try:
+            files.write_arrays(self.checkpoint, experiment.state())
+            files.write_text(self.history, experiment.history())
+            with self.timing.open("a", encoding="utf-8") as file:
+                if file.tell() == 0:
+                    file.write("generation,seconds\n")
+                file.write(f"{experiment.records[-1].generation},{seconds:.3f}\n")
+        except OSError as error:
+            raise UserError(
+                f"cannot write '{self.path}': {error.strerror}; what was there before "
+                f"is intact: --resume {self.path}"
+            ) from None
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run has written everything."""
+        return bool(self._stored_provenance().get("finished"))
+
+    def mark_finished(self) -> None:
+        """Write down when everything was there."""
+        fields = self._stored_provenance() | {"finished": now()}
+        files.write_text(self.provenance, to_json(fields))
+
+    def contents(self) -> str:
+        """Names of the files, for a person."""
+        return ", ".join(sorted(path.name for path in self.path.iterdir()))
+
+    def _stored_provenance(self) -> dict:
+        """What is known of the run's beginning; empty if it was killed before."""
+        if not self.provenance.is_file():
+            return {}
+        return json.loads(self.provenance.read_text(encoding="utf-8"))
+
+
+def _flat(config: ExperimentConfig) -> dict:
+    """Keys and values, the optimiser's as `optimizer.<key>`."""
+    fields = yaml.safe_load(config.to_yaml())
+    optimizer = fields.pop("optimizer")
+    return fields | {f"optimizer.{key}": value for key, value in optimizer.items()}
