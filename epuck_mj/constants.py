@@ -51,18 +51,18 @@ SUPPORT_RADIUS = 0.005
 SUPPORT_OFFSET = 0.0225
 """Distance of the supports from the axle, front and rear [m]. FARSA."""
 
-DRIVE_INERTIA = 3e-5
+DRIVE_INERTIA = 3e-4
 """Inertia of a motor's rotor as the wheel feels it through the gear [kg m^2].
 
-Not published. Of the order of a small stepper's rotor (1e-8) times the gear ratio
-squared, and large enough for wheel servo and tyre friction to be integrated together:
-see benchmarks/convergence.md.
+Not published: chosen. A stepper's speed is commanded, so the robot's mass must not slow
+it: this is ten times what the wheels feel of that mass. It also lets wheel servo and
+tyre friction be integrated with one physics step: see benchmarks/convergence.md.
 """
 
-DRIVE_GAIN = 0.004
-"""Gain of the wheel's velocity servo [N m s/rad]: a time constant of 16 ms.
+DRIVE_GAIN = 0.02
+"""Gain of a wheel's velocity servo [N m s/rad]: a time constant of 15 ms.
 
-The real stepper takes a new rate at once (FIRMWARE); a stiffer servo makes tyres slip.
+Chosen: the real motor takes a new rate at once (FIRMWARE), with its tyre slipping.
 """
 
 STEPS_PER_REVOLUTION = 1000

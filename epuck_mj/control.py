@@ -1,12 +1,13 @@
 """The control step and the trial: the same for one robot and for thousands."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 
 from epuck_mj.constants import PROXIMITY_RANGE
+from epuck_mj.errors import UserError
 from epuck_mj.fitness import StepFitness, step_fitness
 from epuck_mj.motors import Speeds, command
 from epuck_mj.sensors import Reading, observe
@@ -53,6 +54,18 @@ class TaskParameters:
     fitness: str = "product"
     sensor_range: float = PROXIMITY_RANGE
     speeds: Speeds = field(default_factory=Speeds)
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
+        """What `dataclasses.asdict` gave, as stored with a controller.
+
+        Raises:
+          UserError: if the fields are others.
+        """
+        try:
+            return cls(**{**fields, "speeds": Speeds(**fields["speeds"])})
+        except (KeyError, TypeError) as error:
+            raise UserError(f"not the parameters of a task: {error}") from None
 
     @property
     def step_fitness(self) -> StepFitness:

@@ -6,6 +6,7 @@ import tempfile
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
+from tokenize import TokenError
 
 import numpy as np
 
@@ -47,12 +48,22 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
       UserError: if it is missing, truncated or something else.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
+        # in memory: np.load leaves a damaged archive open
+        content = path.read_bytes()
+    except OSError as error:
+        raise UserError(f"cannot read '{path}': {error.strerror}") from None
+    if not content.startswith(b"PK"):
+        raise UserError(f"cannot read '{path}': expected an .npz archive")
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
             return dict(file)
-    except FileNotFoundError:
-        raise UserError(f"no file '{path}'") from None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, KeyError) as error:
-        raise UserError(f"cannot read '{path}': {error}") from None
+    except DAMAGED as error:
+        reason = " ".join(str(error).split())
+        raise UserError(f"cannot read '{path}': {reason}") from None
+
+
+DAMAGED = (TypeError, ValueError, EOFError, OSError, zipfile.BadZipFile, TokenError)
+"""What numpy and zipfile raise for damaged archives."""
 
 
 def _umask() -> int:

@@ -12,6 +12,7 @@ from mujoco.batch import Batch
 from scipy import ndimage
 
 from epuck_mj.errors import UserError
+from epuck_mj.geometry import box_around, walls
 from epuck_mj.model import ROBOT_BODY, SHELL, Scene
 
 NODES_MAX = 400
@@ -43,7 +44,13 @@ class FreeSpace:
         self._scene = scene
         self._model = _with_margin(scene.model, clearance)
         self._checks = Batch(self._model, BLOCK, 1)
-        self.lower, self.upper = self._bounds()
+        box = box_around(scene.model, walls(scene.model))
+        if box is None:
+            raise UserError(
+                f"arena '{scene.arena}' has no walls: expected geoms fixed to the "
+                "world that the robot's shell can hit"
+            )
+        self.lower, self.upper = box[0][:2], box[1][:2]
         # one shell's width of outside all around
         border = 2 * scene.model.geom(SHELL).rbound.item() + clearance
         size = self.upper - self.lower + 2 * border
@@ -73,28 +80,6 @@ class FreeSpace:
             f"arena '{self._scene.arena}' has almost no room for a start: "
             f"{len(starts)} of {n} found among {BLOCK * BLOCKS_MAX} candidates"
         )
-
-    def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Corners of the rectangle around all walls, x and y [m]."""
-        model = self._model
-        shell = model.geom(SHELL)
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        hits = (model.geom_contype & shell.conaffinity) | (
-            model.geom_conaffinity & shell.contype
-        )
-        wall = (hits != 0) & (model.geom_bodyid == 0)
-        wall &= model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
-        if not wall.any():
-            raise UserError(
-                f"arena '{self._scene.arena}' has no walls: expected geoms of the "
-                "world body that the robot's shell can hit"
-            )
-        rotation = data.geom_xmat[wall].reshape(-1, 3, 3)
-        box = model.geom_aabb[wall]
-        center = data.geom_xpos[wall] + np.einsum("nij,nj->ni", rotation, box[:, :3])
-        half = np.einsum("nij,nj->ni", np.abs(rotation), box[:, 3:])
-        return (center - half).min(axis=0)[:2], (center + half).max(axis=0)[:2]
 
     def _inside(self, shape: tuple[int, int]) -> np.ndarray:
         """Which grid nodes are free and enclosed by walls, `shape`."""

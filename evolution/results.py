@@ -124,7 +124,7 @@ def _show(
     task = experiment.config.task
     trials = [record(scene, controller.controller, start, task) for start in starts]
     titles = [
-        f"start {i}: fitness {trial.fitness.sum():.0f}"
+        f"start {i}: fitness {trial.trial_fitness:.0f}"
         for i, trial in enumerate(trials)
     ]
     save_figure(

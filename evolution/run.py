@@ -12,8 +12,8 @@ from typing import Literal
 
 import tyro
 
+from epuck_mj.command_line import command, main, parse
 from epuck_mj.errors import UserError
-from evolution.command_line import command, main, parse
 from evolution.config import (
     DEFAULT_EXPERIMENT,
     ExperimentConfig,

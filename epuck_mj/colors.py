@@ -1,0 +1,17 @@
+"""Colours that the colour-blind tell apart too: those of Okabe and Ito."""
+
+import numpy as np
+
+GREY, FAINT = (150, 150, 150), (180, 180, 180)
+ORANGE, SKY, GREEN = (230, 159, 0), (86, 180, 233), (0, 158, 115)
+YELLOW, BLUE, VERMILION = (240, 228, 66), (0, 114, 178), (213, 94, 0)
+PURPLE = (204, 121, 167)
+
+LOW_FITNESS, HIGH_FITNESS = YELLOW, BLUE
+"""Colours of a path, from step fitness 0 to 1."""
+
+
+def blend(low: tuple, high: tuple, share: np.ndarray) -> np.ndarray:
+    """Colours `(n, 3)` from `low` at 0 to `high` at 1, for `share` `(n,)`."""
+    mixed = np.array(low) + share[:, None] * (np.array(high) - low)
+    return np.round(mixed).astype(np.uint8)

@@ -1,0 +1,154 @@
+"""Trajectories: all that one robot did and sensed in one trial, as plain arrays.
+
+The neutral record of a trial, stored as .npz; figures and recordings are views of it.
+"""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from epuck_mj.constants import N_PROXIMITY
+from epuck_mj.control import Policy, TaskParameters, control_step
+from epuck_mj.errors import UserError
+from epuck_mj.files import read_arrays, write_arrays
+from epuck_mj.model import Scene
+from epuck_mj.sensors import observe
+from epuck_mj.simulation import SimulatedRobots
+
+FORMAT = "epuck_mj.trajectory/1"
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """One trial of one robot, `T` control steps; row 0 is the start.
+
+    `action[k]` was decided on `observation[k]`, earned `fitness[k]` and led to row
+    `k + 1` of what is sensed.
+
+    Attributes:
+      time: since the start [s], `(T + 1,)`.
+      pose: where the robot was, `(T + 1, 3)`: x, y [m], yaw [rad].
+      distance: along each proximity ray [m], negative where nothing was hit,
+        `(T + 1, 8)`.
+      observation: the same as network input in [0, 1], `(T + 1, 8)`.
+      contact: whether the shell touched a wall, `(T + 1,)`, bool.
+      action: what the policy decided, `(T, 2)`: v in [0, 1], w in [-1, 1].
+      command: wheel speeds sent, left and right [rad/s], `(T, 2)`.
+      fitness: step fitness, `(T,)`.
+    """
+
+    time: np.ndarray
+    pose: np.ndarray
+    distance: np.ndarray
+    observation: np.ndarray
+    contact: np.ndarray
+    action: np.ndarray
+    command: np.ndarray
+    fitness: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Refuse arrays that do not belong together."""
+        steps = self.fitness.size
+        expected = {
+            "time": (float, (steps + 1,)),
+            "pose": (float, (steps + 1, 3)),
+            "distance": (float, (steps + 1, N_PROXIMITY)),
+            "observation": (float, (steps + 1, N_PROXIMITY)),
+            "contact": (bool, (steps + 1,)),
+            "action": (float, (steps, 2)),
+            "command": (float, (steps, 2)),
+            "fitness": (float, (steps,)),
+        }
+        for name, (dtype, shape) in expected.items():
+            got = getattr(self, name)
+            if got.dtype != dtype or got.shape != shape:
+                raise ValueError(
+                    f"expected {name} of type {np.dtype(dtype)} and shape {shape}, "
+                    f"got {got.dtype} {got.shape}"
+                )
+
+    @property
+    def steps(self) -> int:
+        """Control steps lived, the crash step included."""
+        return self.fitness.size
+
+    @property
+    def crashed(self) -> bool:
+        """Whether a crash ended the trial."""
+        return bool(self.contact[-1])
+
+    @property
+    def cumulative_fitness(self) -> np.ndarray:
+        """Step fitness summed up to each step, `(T,)`, in the order of the steps."""
+        return np.cumsum(self.fitness)
+
+    @property
+    def trial_fitness(self) -> float:
+        """Sum of the step fitness: to the last bit what `run_trials` reports."""
+        return float(self.cumulative_fitness[-1]) if self.steps else 0.0
+
+    def save(self, path: str | Path) -> None:
+        """Write an .npz; equal trajectories make equal files.
+
+        Raises:
+          UserError: if it cannot be written.
+        """
+        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
+        try:
+            write_arrays(Path(path), {"format": np.array(FORMAT), **arrays})
+        except OSError as error:
+            raise UserError(f"cannot write '{path}': {error.strerror}") from None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read what `save` wrote.
+
+        Raises:
+          UserError: if the file is missing, damaged or something else.
+        """
+        arrays = read_arrays(Path(path))
+        try:
+            if str(arrays.pop("format", "")) != FORMAT:
+                raise ValueError(f"expected format '{FORMAT}'")
+            return cls(**arrays)
+        except (TypeError, ValueError) as error:
+            raise UserError(f"'{path}' is not a trajectory file: {error}") from None
+
+
+def record(
+    scene: Scene, policy: Policy, start: np.ndarray, task: TaskParameters
+) -> Trajectory:
+    """One trial, ended by a crash or after `task.steps`.
+
+    Args:
+      scene: robot and arena.
+      policy: called with observations `(1, 8)`, gives actions `(1, 2)`.
+      start: pose `(3,)`: x, y [m], yaw [rad].
+      task: what a trial is.
+    """
+    robots = SimulatedRobots(scene, 1, 1)
+    reading = robots.reset(np.asarray(start, float)[None])
+    observation = observe(reading.distance, task.sensor_range)
+    poses, readings, observations = [robots.poses()], [reading], [observation]
+    steps = []
+    for _ in range(task.steps):
+        step = control_step(robots, policy, observation, task)
+        observation = step.observation
+        steps.append(step)
+        poses.append(robots.poses())
+        readings.append(step.reading)
+        observations.append(observation)
+        if step.reading.contact[0]:
+            break
+    return Trajectory(
+        time=np.arange(len(poses)) * task.control_step,
+        pose=np.concatenate(poses),
+        distance=np.concatenate([reading.distance for reading in readings]),
+        observation=np.concatenate(observations),
+        contact=np.concatenate([reading.contact for reading in readings]),
+        action=np.concatenate([step.action for step in steps]),
+        command=np.concatenate([step.command for step in steps]),
+        fitness=np.concatenate([step.fitness for step in steps]),
+    )

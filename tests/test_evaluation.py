@@ -1,0 +1,65 @@
+"""Genomes to fitness: the batch against one trial after another."""
+
+import numpy as np
+import pytest
+
+from epuck_mj.control import TaskParameters
+from epuck_mj.controller import Network
+from epuck_mj.starts import FreeSpace
+from epuck_mj.trajectory import record
+from evolution import evaluation
+from evolution.evaluation import BatchEngine, DmControlEngine, evaluate
+
+TASK = TaskParameters(steps=30)
+NETWORK = Network()
+
+
+@pytest.fixture(scope="module")
+def starts(scene) -> np.ndarray:
+    return FreeSpace(scene, 0.01).sample(np.random.default_rng(0), 3)
+
+
+@pytest.fixture(scope="module")
+def genomes() -> np.ndarray:
+    return np.random.default_rng(1).uniform(-5, 5, (6, NETWORK.n_genes))
+
+
+def test_fitness_is_the_mean_over_all_starts(scene, starts, genomes):
+    result = evaluate(BatchEngine(scene, TASK, 1), NETWORK, genomes, starts)
+    for i, genome in enumerate(genomes):
+        for j, start in enumerate(starts):
+            trial = record(scene, NETWORK.decode(genome[None]), start, TASK)
+            assert result.trial_fitness[i, j] == trial.trial_fitness
+            assert result.steps[i, j] == trial.steps
+            assert result.crashed[i, j] == trial.crashed
+    np.testing.assert_allclose(result.fitness, result.trial_fitness.mean(axis=1))
+    assert result.fitness.shape == (6,)
+
+
+def test_engines_agree_to_the_last_bit(scene, starts, genomes):
+    batch = evaluate(BatchEngine(scene, TASK), NETWORK, genomes, starts)
+    single = evaluate(DmControlEngine(scene, TASK), NETWORK, genomes, starts)
+    np.testing.assert_array_equal(batch.trial_fitness, single.trial_fitness)
+    np.testing.assert_array_equal(batch.steps, single.steps)
+    np.testing.assert_array_equal(batch.crashed, single.crashed)
+
+
+def test_chunks_change_nothing(scene, starts, genomes, monkeypatch):
+    whole = evaluate(BatchEngine(scene, TASK), NETWORK, genomes, starts)
+    monkeypatch.setattr(evaluation, "CAPACITY", 5)
+    parts = evaluate(BatchEngine(scene, TASK), NETWORK, genomes, starts)
+    np.testing.assert_array_equal(whole.trial_fitness, parts.trial_fitness)
+    np.testing.assert_array_equal(whole.crashed, parts.crashed)
+
+
+def test_a_crash_in_the_very_last_step_is_one_for_both_engines(scene):
+    """dm_control's time limit hides it in the discount."""
+    ahead = np.zeros((1, 40))
+    ahead[:, 32:36] = 5
+    start = np.array([[0.38, 0.0, 0.0]])
+    trial = record(scene, NETWORK.decode(ahead), start[0], TASK)
+    task = TaskParameters(steps=trial.steps)
+    for engine in (BatchEngine(scene, task), DmControlEngine(scene, task)):
+        result = evaluate(engine, NETWORK, ahead, start)
+        assert result.steps[0, 0] == trial.steps
+        assert result.crashed[0, 0]

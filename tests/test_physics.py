@@ -1,0 +1,162 @@
+"""What the compiled robots do: kinematics, sensors, contacts, warnings."""
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco.batch import Batch
+
+from epuck_mj import constants as c
+from epuck_mj.model import load_scene
+
+OPEN = """<mujoco>
+  <option timestep="0.01" integrator="implicitfast"/>
+  <worldbody>
+    <geom name="floor" type="plane" size="5 5 0.1" contype="2" conaffinity="2"/>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.fixture(scope="module", params=["epuck", "epuck_planar"])
+def alone(request, tmp_path_factory):
+    """Each robot on a floor without walls."""
+    path = tmp_path_factory.mktemp("arena") / "open.xml"
+    path.write_text(OPEN)
+    return load_scene(request.param, str(path))
+
+
+def drive(scene, left: float, right: float, seconds: float) -> np.ndarray:
+    """Pose after driving from rest, `(3,)`, with the yaw counted beyond a turn."""
+    model, data = scene.model, mujoco.MjData(scene.model)
+    mujoco.mj_forward(model, data)
+    data.ctrl[scene.wheels] = left, right
+    yaw, last = 0.0, 0.0
+    for _ in range(round(seconds / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+        now = scene.poses(data.qpos)[2]
+        yaw += (now - last + np.pi) % (2 * np.pi) - np.pi
+        last = now
+    return np.array([*scene.poses(data.qpos)[:2], yaw])
+
+
+def test_one_metre_straight(alone):
+    seconds = 1.0 / c.SPEED_MAX
+    x, y, yaw = drive(alone, c.WHEEL_SPEED_MAX, c.WHEEL_SPEED_MAX, seconds)
+    steps = round(seconds / alone.model.opt.timestep) * alone.model.opt.timestep
+    assert x == pytest.approx(steps * c.SPEED_MAX, rel=0.005)
+    assert abs(y) < 0.001
+    assert abs(yaw) < 0.001
+
+
+def test_ten_turns_on_the_spot(alone):
+    speed = c.WHEEL_SPEED_MAX / 2
+    rate = 2 * speed * c.WHEEL_RADIUS / c.TRACK
+    x, y, yaw = drive(alone, -speed, speed, 20 * np.pi / rate)
+    assert yaw == pytest.approx(20 * np.pi, rel=0.01)
+    assert np.hypot(x, y) < 0.001
+
+
+def test_an_arc(alone):
+    left, right, seconds = 3.0, 6.0, 4.0
+    speed = (left + right) / 2 * c.WHEEL_RADIUS
+    rate = (right - left) * c.WHEEL_RADIUS / c.TRACK
+    radius, angle = speed / rate, rate * seconds
+    x, y, yaw = drive(alone, left, right, seconds)
+    expected = radius * np.array([np.sin(angle), 1 - np.cos(angle)])
+    np.testing.assert_allclose([x, y], expected, atol=0.01 * speed * seconds)
+    assert yaw == pytest.approx(angle, rel=0.01)
+
+
+def test_no_sensor_sees_the_robot_itself(alone):
+    """With nothing around, whatever the robot does, every ray misses."""
+    model, data = alone.model, mujoco.MjData(alone.model)
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        data.ctrl[alone.wheels] = rng.uniform(-1, 1, 2) * c.WHEEL_SPEED_MAX
+        mujoco.mj_step(model, data, alone.n_substeps)
+        mujoco.mj_step1(model, data)
+        reading = alone.reading(data.sensordata)
+        np.testing.assert_array_equal(reading.distance, -1)
+        assert not reading.contact
+
+
+def test_distances_are_those_from_the_shell(scene):
+    """Facing the east wall from 2 cm, as geometry says."""
+    clearance = 0.02
+    x = 0.5 - c.BODY_RADIUS - clearance
+    model, data = scene.model, mujoco.MjData(scene.model)
+    data.qpos[:] = scene.qpos(np.array([x, 0, 0]))
+    mujoco.mj_forward(model, data)
+    distance = scene.reading(data.sensordata).distance
+    cosine = np.cos(np.deg2rad(c.PROXIMITY_ANGLES))
+    for i in (0, 1, 6, 7):
+        expected = (0.5 - x) / cosine[i] - c.BODY_RADIUS
+        assert distance[i] == pytest.approx(expected, abs=1e-5)
+    # turned to the left, the wall is on the right
+    data.qpos[:] = scene.qpos(np.array([x, 0, np.pi / 2]))
+    mujoco.mj_forward(model, data)
+    distance = scene.reading(data.sensordata).distance
+    assert distance[2] == pytest.approx(clearance, abs=1e-5)
+    assert distance[5] > 0.5
+
+
+@pytest.mark.parametrize(("gap", "touches"), [(1e-4, False), (-1e-4, True)])
+def test_shell_reports_its_contact_with_walls(scene, gap, touches):
+    model, data = scene.model, mujoco.MjData(scene.model)
+    data.qpos[:] = scene.qpos(np.array([0.5 - c.BODY_RADIUS - gap, 0.1, 1.0]))
+    mujoco.mj_forward(model, data)
+    assert scene.reading(data.sensordata).contact == touches
+
+
+def test_shell_meets_walls_and_wheels_the_floor():
+    scene = load_scene("epuck", "arena")
+    model, data = scene.model, mujoco.MjData(scene.model)
+    data.qpos[:] = scene.qpos(np.array([0.4655, 0.0, 0.0]))
+    seen = set()
+    for _ in range(300):
+        data.ctrl[:] = c.WHEEL_SPEED_MAX
+        mujoco.mj_step(model, data)
+        names = ([model.geom(g).name for g in contact.geom] for contact in data.contact)
+        seen |= {tuple(sorted(pair)) for pair in names}
+    assert ("shell", "wall_east") in seen
+    assert {pair for pair in seen if "shell" in pair} == {("shell", "wall_east")}
+    rest = {name for pair in seen if "shell" not in pair for name in pair}
+    wheels = {"wheel_left", "wheel_right"}
+    assert wheels <= rest <= wheels | {"floor", "support_front", "support_rear"}
+
+
+def test_gyro_and_velocimeter(alone):
+    model, data = alone.model, mujoco.MjData(alone.model)
+    data.ctrl[alone.wheels] = 2.0, 4.0
+    mujoco.mj_step(model, data, 100)
+    mujoco.mj_step1(model, data)
+    rate, speed = 2 * c.WHEEL_RADIUS / c.TRACK, 3 * c.WHEEL_RADIUS
+    np.testing.assert_allclose(data.sensor("gyro").data, [0, 0, rate], atol=0.05)
+    np.testing.assert_allclose(
+        data.sensor("velocimeter").data, [speed, 0, 0], atol=0.002
+    )
+
+
+@pytest.mark.slow
+def test_a_million_steps_of_random_driving_warn_of_nothing(scene):
+    """Along walls, into walls and corners included; nobody leaves the arena."""
+    n_robots, n_calls = 100, 10_000 // scene.n_substeps
+    rng = np.random.default_rng(1)
+    batch = Batch(scene.model, n_robots, 0, persistent=True)
+    poses = rng.uniform([-0.45, -0.45, -np.pi], [0.45, 0.45, np.pi], (n_robots, 3))
+    batch.bind("qpos")[:] = scene.qpos(poses)
+    ctrl, touched = batch.bind("ctrl"), np.zeros(n_robots, int)
+    sensordata = batch.bind("sensordata")
+    for call in range(n_calls):
+        # half keep their command for two seconds and so push along walls
+        turn = np.ones(n_robots, bool)
+        turn[: n_robots // 2] = call % 20 == 0
+        action = rng.uniform(-0.5, 1.5, (n_robots, 2))
+        command = np.clip(action, -1, 1) * c.WHEEL_SPEED_MAX
+        ctrl[np.ix_(turn, scene.wheels)] = command[turn]
+        batch.step(nstep=scene.n_substeps)
+        touched += scene.reading(sensordata).contact
+    assert batch.warning.sum() == 0
+    assert touched.sum() > 0.05 * n_robots * n_calls
+    inside = np.abs(scene.poses(batch.bind("qpos"))[:, :2]) < 0.5
+    assert inside.all()

@@ -1,0 +1,128 @@
+"""Starts: free, inside, everywhere, and the same for the same seed."""
+
+import mujoco
+import numpy as np
+import pytest
+import scipy.stats
+
+from epuck_mj.constants import BODY_RADIUS
+from epuck_mj.errors import UserError
+from epuck_mj.model import load_scene
+from epuck_mj.starts import FreeSpace
+
+CLEARANCE = 0.01
+
+
+def arena(tmp_path, *geoms: str, name: str = "arena.xml") -> str:
+    floor = '<geom type="plane" size="2 2 1" contype="2" conaffinity="2"/>'
+    path = tmp_path / name
+    path.write_text(
+        f'<mujoco><option timestep="0.01"/><worldbody>{floor}{"".join(geoms)}'
+        "</worldbody></mujoco>"
+    )
+    return str(path)
+
+
+def wall(x: float, y: float, half_x: float, half_y: float) -> str:
+    return f'<geom type="box" pos="{x} {y} 0.03" size="{half_x} {half_y} 0.03"/>'
+
+
+def room(half: float = 0.5) -> list[str]:
+    """Four walls around a square."""
+    return [
+        wall(half + 0.01, 0, 0.01, half + 0.02),
+        wall(-half - 0.01, 0, 0.01, half + 0.02),
+        wall(0, half + 0.01, half, 0.01),
+        wall(0, -half - 0.01, half, 0.01),
+    ]
+
+
+def sample(robot: str, path: str, n: int = 500, seed: int = 0) -> np.ndarray:
+    space = FreeSpace(load_scene(robot, path), CLEARANCE)
+    return space.sample(np.random.default_rng(seed), n)
+
+
+def test_the_square_is_filled_evenly(scene):
+    starts = FreeSpace(scene, CLEARANCE).sample(np.random.default_rng(0), 4000)
+    reach = 0.5 - BODY_RADIUS - CLEARANCE
+    for values, end in zip(starts.T, (reach, reach, np.pi), strict=True):
+        assert np.abs(values).max() <= end + 1e-6
+        uniform = scipy.stats.uniform(-end, 2 * end)
+        assert scipy.stats.kstest(values, uniform.cdf).pvalue > 0.01
+
+
+def test_no_start_touches_anything(scene):
+    """MuJoCo's own distance from the shell to each wall, one by one."""
+    starts = FreeSpace(scene, CLEARANCE).sample(np.random.default_rng(1), 200)
+    model, data = scene.model, mujoco.MjData(scene.model)
+    walls = [g for g in range(model.ngeom) if model.geom(g).name.startswith("wall")]
+    shell = model.geom("shell").id
+    for start in starts:
+        data.qpos[:] = scene.qpos(start)
+        mujoco.mj_kinematics(model, data)
+        distances = [
+            mujoco.mj_geomDistance(model, data, shell, g, 1, None) for g in walls
+        ]
+        assert min(distances) >= CLEARANCE - 1e-6
+
+
+def test_seed_decides_and_a_longer_list_begins_with_the_shorter(scene):
+    space = FreeSpace(scene, CLEARANCE)
+    long = space.sample(np.random.default_rng(5), 100)
+    short = space.sample(np.random.default_rng(5), 7)
+    np.testing.assert_array_equal(long[:7], short)
+    other = space.sample(np.random.default_rng(6), 7)
+    assert not np.array_equal(short, other)
+
+
+def test_both_robots_get_the_same_starts():
+    wheeled, planar = (sample(robot, "arena") for robot in ("epuck", "epuck_planar"))
+    np.testing.assert_array_equal(wheeled, planar)
+
+
+def test_an_l_shape_is_filled_and_never_left(tmp_path):
+    """The bounding box has a quarter that lies outside."""
+    path = arena(
+        tmp_path,
+        wall(-0.51, 0, 0.01, 0.52),
+        wall(0, -0.51, 0.52, 0.01),
+        wall(0.51, -0.25, 0.01, 0.26),
+        wall(-0.25, 0.51, 0.26, 0.01),
+        wall(0.25, 0.01, 0.26, 0.01),
+        wall(0.01, 0.25, 0.01, 0.26),
+    )
+    starts = sample("epuck_planar", path, 2000)
+    x, y = starts[:, 0], starts[:, 1]
+    assert not ((x > 0) & (y > 0)).any()
+    shares = [((x < 0) & (y > 0)).mean(), ((x < 0) & (y < 0)).mean()]
+    assert min(*shares, ((x > 0) & (y < 0)).mean()) > 0.25
+
+
+def test_pillars_and_round_walls_are_kept_clear_of(tmp_path):
+    pillar = '<geom type="cylinder" pos="0.1 0.1 0.03" size="0.08 0.03"/>'
+    starts = sample("epuck_planar", arena(tmp_path, *room(), pillar), 2000)
+    gap = np.hypot(starts[:, 0] - 0.1, starts[:, 1] - 0.1) - 0.08 - BODY_RADIUS
+    assert CLEARANCE - 1e-6 <= gap.min() < CLEARANCE + 0.01
+
+
+def test_a_room_within_walls_only(tmp_path):
+    """A closed box in the middle is outside for a robot too big for it."""
+    inner = [wall(0, 0.05, 0.05, 0.01), wall(0, -0.05, 0.05, 0.01)]
+    inner += [wall(0.05, 0, 0.01, 0.05), wall(-0.05, 0, 0.01, 0.05)]
+    starts = sample("epuck_planar", arena(tmp_path, *room(), *inner))
+    assert np.abs(starts[:, :2]).max(axis=1).min() > 0.06
+
+
+@pytest.mark.parametrize(
+    ("geoms", "expected"),
+    [
+        ([], "has no walls"),
+        (room(0.04), "has no room for a start"),
+        (room()[:3], "has no room for a start"),
+        (['<geom type="box" size="9 9 9" contype="4" conaffinity="4"/>'], "no walls"),
+    ],
+)
+def test_arenas_without_a_place_are_refused(tmp_path, geoms, expected):
+    scene = load_scene("epuck_planar", arena(tmp_path, *geoms))
+    with pytest.raises(UserError, match=expected):
+        FreeSpace(scene, CLEARANCE)

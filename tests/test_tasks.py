@@ -1,0 +1,146 @@
+"""Every registered task is a well-behaved dm_env environment."""
+
+import dm_env
+import numpy as np
+import pytest
+from dm_env import specs
+
+import epuck_mj
+from epuck_mj import SUITE, UserError
+from epuck_mj.control import TaskParameters
+from epuck_mj.model import load_scene
+from epuck_mj.tasks import FollowWalls, environment
+
+TASKS = list(SUITE)
+SHORT = TaskParameters(steps=20)
+
+
+@pytest.fixture(params=TASKS)
+def name(request) -> str:
+    return request.param
+
+
+def make(name: str, seed: int = 1, robot: str = "epuck_planar", parameters=SHORT):
+    return epuck_mj.load(
+        name, {"random": seed, "robot": robot, "parameters": parameters}
+    )
+
+
+def play(env, n_steps: int, seed: int = 0) -> list[dm_env.TimeStep]:
+    rng = np.random.default_rng(seed)
+    spec = env.action_spec()
+    actions = rng.uniform(spec.minimum, spec.maximum, (n_steps, 2))
+    return [env.reset(), *(env.step(action) for action in actions)]
+
+
+@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
+def test_specs_are_obeyed(name, robot):
+    env = make(name, robot=robot)
+    action = env.action_spec()
+    assert isinstance(action, specs.BoundedArray)
+    np.testing.assert_array_equal(action.minimum, [0, -1])
+    np.testing.assert_array_equal(action.maximum, [1, 1])
+    for step in play(env, 60):
+        for key, spec in env.observation_spec().items():
+            spec.validate(step.observation[key])
+        if step.first():
+            assert step.reward is None
+        else:
+            assert 0 <= step.reward <= 1
+            env.reward_spec().validate(step.reward)
+            env.discount_spec().validate(step.discount)
+
+
+def test_seed_decides(name):
+    first, second, other = (play(make(name, seed), 45) for seed in (3, 3, 4))
+    for a, b in zip(first, second, strict=True):
+        np.testing.assert_array_equal(
+            a.observation["proximity"], b.observation["proximity"]
+        )
+        assert a.reward == b.reward
+    rewards = [[step.reward for step in steps] for steps in (first, other)]
+    assert rewards[0] != rewards[1]
+
+
+def test_episodes_of_one_seed_differ(name):
+    env = make(name)
+    scene = load_scene("epuck_planar", "arena")
+    poses = []
+    for _ in range(5):
+        env.reset()
+        poses.append(tuple(scene.poses(env.physics.data.qpos)))
+    assert len(set(poses)) == 5
+
+
+def test_observations_do_not_share_memory(name):
+    env = make(name)
+    steps = play(env, 5)
+    arrays = [step.observation["proximity"] for step in steps]
+    for i, a in enumerate(arrays):
+        for b in arrays[i + 1 :]:
+            assert not np.shares_memory(a, b)
+
+
+def test_episode_ends_after_its_steps(name):
+    env = make(name)
+    env.reset()
+    for step in range(SHORT.steps):
+        time_step = env.step(np.zeros(2))
+        assert time_step.last() == (step == SHORT.steps - 1)
+    # time ran out: the agent may hope for more
+    assert time_step.discount == 1
+    assert env.step(np.zeros(2)).first()
+
+
+@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
+def test_default_episode_is_300_steps_of_a_tenth_of_a_second(name, robot):
+    env = epuck_mj.load(name, {"random": 1, "robot": robot})
+    assert env.control_timestep() == pytest.approx(0.1)
+    env.reset()
+    steps = 0
+    while not env.step(np.zeros(2)).last():
+        steps += 1
+    assert steps + 1 == 300
+
+
+def test_a_crash_terminates(name):
+    env = make(name, parameters=TaskParameters(steps=300))
+    time_step = env.reset()
+    while not time_step.last():
+        time_step = env.step(np.array([1.0, 0.0]))
+    assert time_step.discount == 0
+    assert time_step.reward == 0
+    assert env.task.crashed(env.physics)
+
+
+def test_reward_is_the_step_fitness(name):
+    for fitness in ("product", "literal"):
+        parameters = TaskParameters(steps=20, fitness=fitness)
+        env = make(name, parameters=parameters)
+        env.reset()
+        for action in np.random.default_rng(0).uniform([0, -1], [1, 1], (19, 2)):
+            time_step = env.step(action)
+            if time_step.last():
+                break
+            expected = parameters.step_fitness(
+                action, time_step.observation["proximity"]
+            )
+            assert time_step.reward == expected
+
+
+def test_given_starts_come_first():
+    scene = load_scene("epuck", "arena")
+    starts = np.array([[0.1, 0.2, 0.3], [-0.1, 0.0, 3.0]])
+    env = environment(scene, FollowWalls(scene, SHORT, starts=starts))
+    for start in starts:
+        env.reset()
+        pose = scene.poses(env.physics.data.qpos)
+        np.testing.assert_allclose(pose, start, atol=1e-12)
+        assert not np.any(env.physics.data.qvel)
+    with pytest.raises(RuntimeError, match="no start left"):
+        env.reset()
+
+
+def test_unknown_tasks_are_refused():
+    with pytest.raises(UserError, match="'follow_wall'; available: follow_walls"):
+        epuck_mj.load("follow_wall")
