@@ -9,14 +9,14 @@ BEHIND, RIGHT, RIGHT_DIAGONAL = 3, 2, 1
 AHEAD = (0, 6, 7)
 """Front right, left diagonal, front left."""
 
-CLEAR_AHEAD = 0.85
+CLEAR_AHEAD = 0.95
 """Observation below which something stands in the way."""
 
-TARGET = 0.6
-"""Right-diagonal observation to keep: about 9 mm off the wall, driving along it."""
+TARGET = 0.5
+"""Right-diagonal observation to keep: about 7 mm off the wall, driving along it."""
 
-GAIN = 0.8
-TURN_MAX = 0.25
+GAIN = 1.5
+TURN_MAX = 0.4
 
 
 class WallFollower:

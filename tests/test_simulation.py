@@ -117,8 +117,8 @@ def test_the_hand_written_wall_follower_follows_walls(scene):
     starts = FreeSpace(scene, 0.01).sample(np.random.default_rng(3), 100)
     robots = SimulatedRobots(scene, 100)
     trials = run_trials(robots, WallFollower(), starts, TaskParameters())
-    assert trials.fitness.mean() > 130
-    assert trials.crashed.mean() < 0.25
+    assert trials.fitness.mean() > 180
+    assert trials.crashed.mean() < 0.05
 
 
 @pytest.mark.slow

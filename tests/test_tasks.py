@@ -84,11 +84,10 @@ def test_observations_do_not_share_memory(name):
 def test_episode_ends_after_its_steps(name):
     env = make(name)
     env.reset()
-    for step in range(SHORT.steps):
-        time_step = env.step(np.zeros(2))
-        assert time_step.last() == (step == SHORT.steps - 1)
+    steps = [env.step(np.zeros(2)) for _ in range(SHORT.steps)]
+    assert [step.last() for step in steps] == [False] * (SHORT.steps - 1) + [True]
     # time ran out: the agent may hope for more
-    assert time_step.discount == 1
+    assert steps[-1].discount == 1
     assert env.step(np.zeros(2)).first()
 
 

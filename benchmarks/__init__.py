@@ -1,0 +1,1 @@
+"""Measurements: what the physics step costs, and what it may cost."""

@@ -1,0 +1,203 @@
+"""Which physics step is fine enough: `python -m benchmarks.convergence`.
+
+A fixed set of controllers (the hand-written wall follower and the evolved ones in
+benchmarks/controllers) lives 200 trials under each configuration. A configuration
+passes if every controller's mean fitness is within 5 % of the shipped configuration's
+at a fifth of the shipped step. Writes benchmarks/convergence.md.
+"""
+
+import copy
+import statistics
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import tyro
+
+from epuck_mj.control import BatchPolicy, TaskParameters, run_trials
+from epuck_mj.controller import load
+from epuck_mj.model import Scene, load_scene
+from epuck_mj.simulation import SimulatedRobots
+from epuck_mj.starts import FreeSpace
+from epuck_mj.wall_follower import WallFollower
+
+CONTROLLERS = Path(__file__).resolve().parent / "controllers"
+REPORT = Path(__file__).resolve().with_name("convergence.md")
+TASK = TaskParameters()
+TOLERANCE = 0.05
+N_STARTS = 200
+REFINEMENT = 5
+"""The reference's physics step is this many times smaller than the shipped one."""
+
+STEPS = {
+    "epuck": (1 / 30, 0.025, 0.02, 1 / 60, 0.0125, 0.01, 0.005),
+    "epuck_planar": (0.1, 0.05, 1 / 30, 0.025, 0.02, 0.01),
+}
+"""Physics steps tried with the shipped contacts and solver [s]."""
+
+_CONE, _SOLVER = mujoco.mjtCone, mujoco.mjtSolver
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """How the physics is integrated.
+
+    Attributes:
+        timestep: physics step [s].
+        cone: friction cone.
+        solver: constraint solver.
+        support_gap: gap below the supports at rest [m]; None is as shipped.
+    """
+
+    timestep: float
+    cone: mujoco.mjtCone = _CONE.mjCONE_PYRAMIDAL
+    solver: mujoco.mjtSolver = _SOLVER.mjSOL_NEWTON
+    support_gap: float | None = None
+
+    def applied(self, scene: Scene) -> Scene:
+        """The scene with this configuration."""
+        model = copy.copy(scene.model)
+        model.opt.timestep = self.timestep
+        model.opt.cone, model.opt.solver = self.cone, self.solver
+        if self.support_gap is not None:
+            for name in ("support_front", "support_rear"):
+                geom = model.geom(name)
+                geom.pos[2] = geom.size[0] + self.support_gap
+        n_substeps = round(TASK.control_step / self.timestep)
+        return replace(scene, model=model, n_substeps=n_substeps)
+
+    def row(self) -> str:
+        """Its cells of the table."""
+        cone = _CONE(self.cone).name.removeprefix("mjCONE_").lower()
+        solver = _SOLVER(self.solver).name.removeprefix("mjSOL_")
+        gap = (
+            "as shipped" if self.support_gap is None else f"{1e3 * self.support_gap} mm"
+        )
+        return f"{1e3 * self.timestep:.1f} ms | {cone} | {solver} | {gap}"
+
+
+def configurations(robot: str, shipped: float) -> list[Configuration]:
+    """What is compared: all steps, and every other choice at the finer of them."""
+    tried = [Configuration(step) for step in STEPS[robot]]
+    if robot == "epuck":
+        for step in (shipped, 0.0125):
+            tried += [
+                Configuration(step, cone=_CONE.mjCONE_ELLIPTIC),
+                Configuration(step, solver=_SOLVER.mjSOL_CG),
+                Configuration(step, solver=_SOLVER.mjSOL_PGS),
+                Configuration(step, support_gap=0.0),
+            ]
+    return tried
+
+
+def controllers(n: int) -> dict[str, BatchPolicy]:
+    """The fixed set, each as a policy for `n` robots."""
+    evolved = {path.stem: load(path) for path in sorted(CONTROLLERS.glob("*.json"))}
+    policies: dict[str, BatchPolicy] = {"by hand": WallFollower()}
+    for name, file in evolved.items():
+        policies[name] = file.network.decode(np.tile(file.genome, (n, 1)))
+    return policies
+
+
+def held_out_starts(scene: Scene, n: int) -> np.ndarray:
+    """Starts `(n, 3)` that no run has seen."""
+    return FreeSpace(scene, 0.01).sample(np.random.default_rng(2026), n)
+
+
+def mean_fitness(
+    scene: Scene, policies: Mapping[str, BatchPolicy], starts: np.ndarray
+) -> dict[str, float]:
+    """Each controller's mean over the starts."""
+    robots = SimulatedRobots(scene, len(starts))
+    return {
+        name: float(run_trials(robots, policy, starts, TASK).fitness.mean())
+        for name, policy in policies.items()
+    }
+
+
+def deviation(fitness: Mapping[str, float], reference: Mapping[str, float]) -> float:
+    """Largest relative difference of any controller."""
+    return max(abs(fitness[name] / reference[name] - 1) for name in reference)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Measure how far physics steps can be trusted.
+
+    Attributes:
+        starts: trials of each controller.
+        output: table to write.
+    """
+
+    starts: int = N_STARTS
+    output: Path = REPORT
+
+
+def main(options: Options) -> None:
+    """Measure, print and write the table."""
+    text = [HEADER.format(starts=options.starts, tolerance=TOLERANCE)]
+    for robot in STEPS:
+        text += ["", f"## {robot}", "", *_table(robot, options.starts)]
+    options.output.write_text("\n".join(text) + "\n")
+    print(options.output.read_text())
+
+
+def _table(robot: str, n_starts: int) -> list[str]:
+    scene = load_scene(robot, "arena", TASK.control_step)
+    shipped = scene.model.opt.timestep
+    policies, starts = controllers(n_starts), held_out_starts(scene, n_starts)
+    finer = Configuration(shipped / REFINEMENT)
+    reference, _ = _measured(finer.applied(scene), policies, starts)
+    names = " | ".join(reference)
+    lines = [
+        f"| step | cone | solver | supports | {names} | deviation | cost | passes |",
+        "|" + "---|" * (7 + len(reference)),
+        f"| {finer.row()} | {_cells(reference)} | reference | | |",
+    ]
+    costs, rows = {}, []
+    for configuration in configurations(robot, shipped):
+        fitness, seconds = _measured(configuration.applied(scene), policies, starts)
+        costs[configuration] = seconds
+        off = deviation(fitness, reference)
+        rows.append((configuration, fitness, off))
+    unit = costs[Configuration(shipped)]
+    for configuration, fitness, off in rows:
+        mark = "yes" if off <= TOLERANCE else "no"
+        mark += ", shipped" if configuration == Configuration(shipped) else ""
+        lines.append(
+            f"| {configuration.row()} | {_cells(fitness)} | {off:.1%} | "
+            f"{costs[configuration] / unit:.2f} | {mark} |"
+        )
+    return lines
+
+
+def _measured(
+    scene: Scene, policies: Mapping[str, BatchPolicy], starts: np.ndarray
+) -> tuple[dict[str, float], float]:
+    """Mean fitness, and CPU seconds for a control step of a robot that lives."""
+    fitness = mean_fitness(scene, policies, starts)
+    robots, task = SimulatedRobots(scene, len(starts), 1), replace(TASK, steps=30)
+    costs = []
+    for _ in range(3):
+        before = time.process_time()
+        trials = run_trials(robots, WallFollower(), starts, task)
+        costs.append((time.process_time() - before) / trials.steps.sum())
+    return fitness, statistics.median(costs)
+
+
+def _cells(fitness: Mapping[str, float]) -> str:
+    return " | ".join(f"{value:.1f}" for value in fitness.values())
+
+
+HEADER = """# Which physics step is fine enough
+
+Made by `python -m benchmarks.convergence`. Mean fitness of 300 over {starts} starts of
+the hand-written wall follower and of evolved controllers (benchmarks/controllers); the
+reference is the shipped configuration at a fifth of its step. Deviation: the largest of
+any controller; up to {tolerance:.0%} passes. Cost: CPU time, the shipped one's is 1."""
+
+if __name__ == "__main__":
+    main(tyro.cli(Options))

@@ -1,0 +1,167 @@
+"""Throughput of evaluation against MuJoCo's own limit: `make bench`.
+
+(a) a plain loop in C, `mj_step(model, data, nstep)`, on the compiled scene: the limit;
+(b) our batch evaluator with the 8-4-2 policy and fitness, on 1 and on 2 threads;
+(c) a straightforward dm_control episode loop with the same policy.
+
+Shared machines are noisy, so the three are measured in turns and only ratios of one
+turn count; the medians over all turns are reported. Shares of one core are ratios of
+CPU time; what two threads gain is wall time and wants an idle machine.
+"""
+
+import json
+import os
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import tyro
+
+from epuck_mj.control import TaskParameters, run_trials
+from epuck_mj.controller import Controller, Network
+from epuck_mj.model import Scene, load_scene
+from epuck_mj.simulation import SimulatedRobots
+from epuck_mj.starts import FreeSpace
+from epuck_mj.tasks import FollowWalls, environment
+
+ROBOTS = ("epuck", "epuck_planar")
+N_ROBOTS = 750
+"""A generation of DE/best: 150 individuals on 5 starts."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Measure throughput.
+
+    Attributes:
+        json: file for the figures.
+        repeats: turns to measure.
+    """
+
+    json: Path | None = None
+    repeats: int = 9
+
+
+@dataclass(frozen=True)
+class Rate:
+    """Physics steps per second, by the wall and by the CPU."""
+
+    wall: float
+    cpu: float
+
+
+@dataclass(frozen=True)
+class Turn:
+    """One measurement of each, close together in time."""
+
+    mj_step: Rate
+    batch_1: Rate
+    batch_2: Rate
+    dm_control: Rate
+
+
+def main(options: Options) -> None:
+    """Measure, print and write."""
+    results = {}
+    for robot in ROBOTS:
+        results[robot] = measure(robot, options.repeats)
+        print(robot)
+        for name, value in results[robot].items():
+            print(f"  {name:36} {value:10.4g}")
+    if options.json is not None:
+        options.json.write_text(json.dumps(results, indent=1) + "\n")
+
+
+def measure(robot: str, repeats: int) -> dict[str, float]:
+    """Medians of the ratios of interleaved repeats."""
+    scene = load_scene(robot, "arena")
+    # everybody lives all steps: straight ahead, slowly, from the middle
+    task = TaskParameters(steps=30)
+    starts = FreeSpace(scene, 0.12).sample(np.random.default_rng(0), N_ROBOTS)
+    controller = Network().decode(_harmless(N_ROBOTS))
+    one, two = (SimulatedRobots(scene, N_ROBOTS, threads) for threads in (1, 2))
+    turns = [
+        Turn(
+            mj_step=_rate(lambda: _mj_step(scene)),
+            batch_1=_rate(lambda: _batch(one, controller, starts, task)),
+            batch_2=_rate(lambda: _batch(two, controller, starts, task)),
+            dm_control=_rate(lambda: _dm_control(scene, controller, starts, task)),
+        )
+        for _ in range(repeats)
+    ]
+
+    def median(figure: Callable[[Turn], float]) -> float:
+        return statistics.median(figure(turn) for turn in turns)
+
+    step = scene.model.opt.timestep
+    return {
+        "share_of_mj_step": median(lambda t: t.batch_1.cpu / t.mj_step.cpu),
+        "thread_scaling": median(lambda t: t.batch_2.wall / t.batch_1.wall),
+        "over_dm_control": median(lambda t: t.batch_2.wall / t.dm_control.wall),
+        "simulated_seconds_per_cpu_second": median(lambda t: t.batch_1.cpu * step),
+        "mj_step_microseconds": median(lambda t: 1e6 / t.mj_step.cpu),
+        "physics_step_seconds": step,
+        "cores": os.cpu_count() or 1,
+    }
+
+
+def _rate(work: Callable[[], int]) -> Rate:
+    """Speed of work that returns its number of physics steps."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    n_steps = work()
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    return Rate(n_steps / wall, n_steps / cpu)
+
+
+def _harmless(n: int) -> np.ndarray:
+    """Genomes that drive at a third of full speed, turning a little."""
+    genomes = np.zeros((n, Network().n_genes))
+    genomes[:, 32:36] = -0.35
+    genomes[:, 36:] = np.random.default_rng(1).uniform(-0.1, 0.1, (n, 1))
+    return genomes
+
+
+def _mj_step(scene: Scene, n_steps: int = 50_000) -> int:
+    """The limit: one robot drives a circle of 13 cm, all in C."""
+    data = mujoco.MjData(scene.model)
+    mujoco.mj_forward(scene.model, data)
+    data.ctrl[scene.wheels] = 2.0, 3.0
+    mujoco.mj_step(scene.model, data, n_steps)
+    return n_steps
+
+
+def _batch(
+    robots: SimulatedRobots,
+    controller: Controller,
+    starts: np.ndarray,
+    task: TaskParameters,
+) -> int:
+    """Our evaluator: a generation of trials, policy and fitness included."""
+    trials = run_trials(robots, controller, starts, task)
+    return int(trials.steps.sum()) * robots.scene.n_substeps
+
+
+def _dm_control(
+    scene: Scene,
+    controller: Controller,
+    starts: np.ndarray,
+    task: TaskParameters,
+    episodes: int = 20,
+) -> int:
+    """A plain dm_control loop over some of the same trials."""
+    env = environment(scene, FollowWalls(scene, task, starts=starts))
+    n_steps = 0
+    for i in range(episodes):
+        policy, time_step = controller[i], env.reset()
+        while not time_step.last():
+            time_step = env.step(policy(time_step.observation["proximity"]))
+            n_steps += scene.n_substeps
+    return n_steps
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Options))
