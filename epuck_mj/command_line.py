@@ -21,8 +21,8 @@ def parse(default: Options, prog: str, argv: Sequence[str]) -> Options:
     """The options in `argv`, on top of `default`, whose fields are the flags.
 
     Raises:
-      UserError: if the arguments cannot be understood.
-      SystemExit: after printing help.
+        UserError: if the arguments cannot be understood.
+        SystemExit: after printing help.
     """
     box = io.StringIO()
     try:

@@ -40,11 +40,11 @@ class TaskParameters:
     """What a trial is.
 
     Attributes:
-      steps: control steps of a trial.
-      control_step: duration of a control step [s].
-      fitness: name of the step fitness, `product` or `literal`.
-      sensor_range: where an obstacle stops being seen [m].
-      speeds: what a full action means.
+        steps: control steps of a trial.
+        control_step: duration of a control step [s].
+        fitness: name of the step fitness, `product` or `literal`.
+        sensor_range: where an obstacle stops being seen [m].
+        speeds: what a full action means.
 
     Source: paper, section 4, where it says; our choices otherwise.
     """
@@ -60,7 +60,7 @@ class TaskParameters:
         """What `dataclasses.asdict` gave, as stored with a controller.
 
         Raises:
-          UserError: if the fields are others.
+            UserError: if the fields are others.
         """
         try:
             return cls(**{**fields, "speeds": Speeds(**fields["speeds"])})
@@ -78,11 +78,11 @@ class ControlStep:
     """One control step of robots `(...)`: decided, carried out and judged.
 
     Attributes:
-      action: what the policy decided, `(..., 2)`.
-      command: wheel speeds sent [rad/s], `(..., 2)`.
-      reading: what was sensed after the world moved.
-      observation: the same as network input, `(..., 8)`: the next step's input.
-      fitness: step fitness, `(...)`; 0 in a step that ends in a crash.
+        action: what the policy decided, `(..., 2)`.
+        command: wheel speeds sent [rad/s], `(..., 2)`.
+        reading: what was sensed after the world moved.
+        observation: the same as network input, `(..., 8)`: the next step's input.
+        fitness: step fitness, `(...)`; 0 in a step that ends in a crash.
     """
 
     action: np.ndarray
@@ -110,9 +110,9 @@ class Trials:
     """Outcome of `(trials,)` trials.
 
     Attributes:
-      fitness: sum of the step fitness, `(trials,)`.
-      steps: control steps lived, the crash step included, `(trials,)`.
-      crashed: whether a crash ended the trial, `(trials,)`.
+        fitness: sum of the step fitness, `(trials,)`.
+        steps: control steps lived, the crash step included, `(trials,)`.
+        crashed: whether a crash ended the trial, `(trials,)`.
     """
 
     fitness: np.ndarray
@@ -138,10 +138,10 @@ def run_trials(
     """One trial per start; a robot that crashes is not stepped again.
 
     Args:
-      robots: to put on the starts.
-      policy: one member per start.
-      starts: poses `(trials, 3)`: x, y [m], yaw [rad].
-      task: what a trial is.
+        robots: to put on the starts.
+        policy: one member per start.
+        starts: poses `(trials, 3)`: x, y [m], yaw [rad].
+        task: what a trial is.
     """
     n_trials = len(starts)
     fitness = np.zeros(n_trials)

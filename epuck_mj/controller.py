@@ -22,8 +22,8 @@ class Network:
     """Shape of the network.
 
     Attributes:
-      hidden: number of hidden neurons.
-      biases: whether hidden and output neurons have a bias weight.
+        hidden: number of hidden neurons.
+        biases: whether hidden and output neurons have a bias weight.
     """
 
     hidden: int = 4
@@ -42,7 +42,7 @@ class Network:
         weights (and its bias last), then the output neurons likewise.
 
         Raises:
-          ValueError: if the genomes have another length.
+            ValueError: if the genomes have another length.
         """
         genomes = np.asarray(genomes, float)
         if genomes.shape[-1] != self.n_genes:
@@ -66,9 +66,9 @@ class Controller:
     """One controller, or a batch `(...)` of them; call it with observations.
 
     Attributes:
-      hidden: weights `(inputs, ..., hidden)`; one row more than the observation
-        has values is a bias.
-      output: weights `(hidden, ..., 2)`, likewise.
+        hidden: weights `(inputs, ..., hidden)`; one row more than the observation
+            has values is a bias.
+        output: weights `(hidden, ..., 2)`, likewise.
     """
 
     hidden: np.ndarray
@@ -117,11 +117,11 @@ class ControllerFile:
     """A controller with all that is needed to use it, as stored in JSON.
 
     Attributes:
-      network: its shape.
-      genome: its weights, `(genes,)`.
-      task: what its world was: speeds, sensor law, fitness, steps (plain values).
-      scene: robot and arena it was evolved in, with hashes of their MJCF.
-      scores: stored and held-out fitness, and how each was measured.
+        network: its shape.
+        genome: its weights, `(genes,)`.
+        task: what its world was: speeds, sensor law, fitness, steps (plain values).
+        scene: robot and arena it was evolved in, with hashes of their MJCF.
+        scores: stored and held-out fitness, and how each was measured.
     """
 
     network: Network
@@ -152,7 +152,7 @@ class ControllerFile:
         """Read `to_json`'s text back.
 
         Raises:
-          ValueError: if it is anything else.
+            ValueError: if it is anything else.
         """
         fields = json.loads(text)
         if not isinstance(fields, dict) or fields.get("format") != FORMAT:
@@ -173,7 +173,7 @@ def load(path: str | Path) -> ControllerFile:
     """The controller stored at `path`.
 
     Raises:
-      UserError: if there is none, or it is not a controller file.
+        UserError: if there is none, or it is not a controller file.
     """
     path = Path(path)
     try:

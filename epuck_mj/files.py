@@ -45,7 +45,7 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """The arrays of an .npz file.
 
     Raises:
-      UserError: if it is missing, truncated or something else.
+        UserError: if it is missing, truncated or something else.
     """
     try:
         # in memory: np.load leaves a damaged archive open

@@ -35,8 +35,8 @@ def product(action: np.ndarray, observation: np.ndarray) -> np.ndarray:
     """Fast, straight and close to a wall, all at once, `(...,)`.
 
     Args:
-      action: `(..., 2)`, the action just carried out.
-      observation: `(..., 8)`, seen after it.
+        action: `(..., 2)`, the action just carried out.
+        observation: `(..., 8)`, seen after it.
     """
     return fast(action) * (1.0 - turning(action)) * close(observation)
 
@@ -55,7 +55,7 @@ def step_fitness(name: str) -> StepFitness:
     """The step fitness of that name.
 
     Raises:
-      UserError: if there is none.
+        UserError: if there is none.
     """
     if name not in STEP_FITNESS:
         available = ", ".join(sorted(STEP_FITNESS))

@@ -87,8 +87,8 @@ def kinematics(
     """Where bodies and rays are on each pose `(n, 3)`, in the world.
 
     Returns:
-      Positions [m] and quaternions of all bodies, `(n, nbody, 3)`, `(n, nbody, 4)`;
-      origins [m] and directions of the rays, `(n, 8, 3)` both.
+        Positions [m] and quaternions of all bodies, `(n, nbody, 3)`, `(n, nbody, 4)`;
+        origins [m] and directions of the rays, `(n, 8, 3)` both.
     """
     model, data = scene.model, mujoco.MjData(scene.model)
     sites = [model.sensor(name).objid[0] for name in PROXIMITY]

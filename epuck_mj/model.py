@@ -19,6 +19,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.sensors import Reading
 
 MODELS = Path(__file__).resolve().parent.parent / "models"
+SHIPPED_ROBOTS = ("epuck.xml", "epuck_planar.xml")
 ROBOT_BODY = "epuck"
 SHELL = "shell"
 TIMESTEP = "timestep"
@@ -33,11 +34,11 @@ class Scene:
     """A compiled scene and where its robot's parts are.
 
     Attributes:
-      model: the compiled model.
-      n_substeps: physics steps in a control step.
-      wheels: indices of the wheels' actuators, left and right, `(2,)`.
-      robot: path of the robot's MJCF.
-      arena: path of the arena's MJCF.
+        model: the compiled model.
+        n_substeps: physics steps in a control step.
+        wheels: indices of the wheels' actuators, left and right, `(2,)`.
+        robot: path of the robot's MJCF.
+        arena: path of the arena's MJCF.
     """
 
     model: mujoco.MjModel
@@ -98,14 +99,15 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
     """Put a robot into an arena.
 
     Args:
-      robot: name of a shipped robot, or path of an MJCF with the same interface.
-      arena: name of a shipped arena, or path of an MJCF with walls.
-      control_step: its duration [s], a multiple of the arena's physics step.
+        robot: name of a shipped robot, or path of an MJCF with the same interface.
+        arena: name of a shipped arena, or path of an MJCF with walls.
+        control_step: its duration [s], a multiple of the arena's physics step.
 
     Raises:
-      UserError: if a file is missing or broken, or a part of the robot is.
+        UserError: if a file is missing or broken, or a part of the robot is.
     """
-    robot_path = _find(robot, "robot", sorted(MODELS.glob("epuck*.xml")))
+    robots = [MODELS / name for name in SHIPPED_ROBOTS]
+    robot_path = _find(robot, "robot", robots)
     arenas = [MODELS / "arena.xml", *sorted(MODELS.glob("arenas/*.xml"))]
     arena_path = _find(arena, "arena", arenas)
     # compiled alone first: errors in an included file have no line number
@@ -135,10 +137,10 @@ def _with_robot(arena: Path, robot: Path) -> tuple[str, dict[str, bytes]]:
     files, found = {}, False
     for name in _includes(text, arena):
         path = arena.parent / name
-        included = _read(path)
-        if _has_robot(included, path):
-            found, included = True, _read(robot)
-        files[name] = included.encode()
+        # a copied arena may name a robot that it left behind
+        if path.name in SHIPPED_ROBOTS or _has_robot(_read(path), path):
+            found, path = True, robot
+        files[name] = _read(path).encode()
     if found:
         return text, files
     if _has_robot(text, arena):

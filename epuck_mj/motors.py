@@ -18,8 +18,8 @@ class Speeds:
     """What a full action means: v = 1 and |w| = 1 in SI units.
 
     Attributes:
-      forward: speed at v = 1 [m/s].
-      turn: yaw rate at |w| = 1 [rad/s].
+        forward: speed at v = 1 [m/s].
+        turn: yaw rate at |w| = 1 [rad/s].
     """
 
     forward: float = SPEED_MAX
@@ -30,11 +30,11 @@ def command(action: np.ndarray, speeds: Speeds) -> np.ndarray:
     """Wheel speeds for an action, saturated where the firmware saturates.
 
     Args:
-      action: `(..., 2)`: v in [0, 1] and w in [-1, 1]; w > 0 turns right.
-      speeds: what a full action means.
+        action: `(..., 2)`: v in [0, 1] and w in [-1, 1]; w > 0 turns right.
+        speeds: what a full action means.
 
     Returns:
-      Left and right wheel speed [rad/s], `(..., 2)`, within +-1000 steps/s each.
+        Left and right wheel speed [rad/s], `(..., 2)`, within +-1000 steps/s each.
 
     Source: paper, section 4 (signs); two-wheel kinematics.
     """

@@ -73,16 +73,16 @@ def render(scene: Scene, trajectory: Trajectory, width: int, height: int) -> np.
     """The arena with the path on its floor and the robot where it ended.
 
     Args:
-      scene: where the trajectory was recorded.
-      trajectory: what happened.
-      width: of the picture [pixels].
-      height: of the picture [pixels].
+        scene: where the trajectory was recorded.
+        trajectory: what happened.
+        width: of the picture [pixels].
+        height: of the picture [pixels].
 
     Returns:
-      Picture `(height, width, 3)`, 0 to 255.
+        Picture `(height, width, 3)`, 0 to 255.
 
     Raises:
-      UserError: if no OpenGL is there.
+        UserError: if no OpenGL is there.
     """
     # the copy is for looking at only
     model = copy.copy(scene.model)
@@ -129,7 +129,7 @@ def opengl(width: int, height: int) -> Iterator[None]:
     """OpenGL without a window, current while the context lasts.
 
     Raises:
-      UserError: if there is none.
+        UserError: if there is none.
     """
     name = os.environ.get("MUJOCO_GL", "")
     if name not in LIBRARIES:
@@ -185,7 +185,7 @@ def run(options: Options) -> None:
     """Draw and write the picture.
 
     Raises:
-      UserError: for anything a user can put right.
+        UserError: for anything a user can put right.
     """
     file = load(options.champion)
     task = TaskParameters.from_dict(file.task)

@@ -20,9 +20,9 @@ class SimulatedRobots:
         """Allocate the robots.
 
         Args:
-          scene: robot and arena.
-          capacity: the most robots that a reset can place.
-          threads: threads that step them; 0 is one per core.
+            scene: robot and arena.
+            capacity: the most robots that a reset can place.
+            threads: threads that step them; 0 is one per core.
         """
         self.scene = scene
         self.capacity = capacity
@@ -38,7 +38,7 @@ class SimulatedRobots:
         """Put a robot at rest on each start `(robots, 3)`: x, y [m], yaw [rad].
 
         Raises:
-          ValueError: if there are more starts than robots.
+            ValueError: if there are more starts than robots.
         """
         if len(starts) > self.capacity:
             raise ValueError(
@@ -54,7 +54,7 @@ class SimulatedRobots:
         """Drive the active robots for one control step.
 
         Args:
-          command: wheel speeds [rad/s], `(active, 2)`.
+            command: wheel speeds [rad/s], `(active, 2)`.
         """
         self._ctrl[self._active[:, None], self.scene.wheels] = command
         self._batch.step(

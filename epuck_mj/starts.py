@@ -35,11 +35,11 @@ class FreeSpace:
         """Find the free space, on a grid first.
 
         Args:
-          scene: robot and arena.
-          clearance: least distance from the shell to anything it can hit [m].
+            scene: robot and arena.
+            clearance: least distance from the shell to anything it can hit [m].
 
         Raises:
-          UserError: if no walls, no room or no inside is there.
+            UserError: if no walls, no room or no inside is there.
         """
         self._scene = scene
         self._model = _with_margin(scene.model, clearance)
@@ -63,7 +63,7 @@ class FreeSpace:
         """Uniform random starts `(n, 3)`: x, y [m], yaw [rad].
 
         Raises:
-          UserError: if the free space is too small to be hit.
+            UserError: if the free space is too small to be hit.
         """
         starts = np.zeros((0, 3))
         for _ in range(BLOCKS_MAX):

@@ -42,12 +42,12 @@ def load(
     """An environment of the named task, as `dm_control.suite.load` gives it.
 
     Args:
-      task_name: one of `SUITE`.
-      task_kwargs: arguments of the task's function below.
-      environment_kwargs: arguments of `dm_control.rl.control.Environment`.
+        task_name: one of `SUITE`.
+        task_kwargs: arguments of the task's function below.
+        environment_kwargs: arguments of `dm_control.rl.control.Environment`.
 
     Raises:
-      UserError: if there is no such task, or robot or arena cannot be used.
+        UserError: if there is no such task, or robot or arena cannot be used.
     """
     if task_name not in SUITE:
         raise UserError(f"unknown task '{task_name}'; available: {', '.join(SUITE)}")
@@ -68,12 +68,12 @@ def follow_walls(
     """Follow the walls of an arena without touching them.
 
     Args:
-      robot: name of a shipped robot, or path of an MJCF.
-      arena: name of a shipped arena, or path of an MJCF.
-      parameters: steps, control step, fitness, sensor range, speeds.
-      start_clearance: least distance from the shell to a wall at a start [m].
-      random: seed of the starts, or a generator to draw them from.
-      environment_kwargs: arguments of `dm_control.rl.control.Environment`.
+        robot: name of a shipped robot, or path of an MJCF.
+        arena: name of a shipped arena, or path of an MJCF.
+        parameters: steps, control step, fitness, sensor range, speeds.
+        start_clearance: least distance from the shell to a wall at a start [m].
+        random: seed of the starts, or a generator to draw them from.
+        environment_kwargs: arguments of `dm_control.rl.control.Environment`.
     """
     parameters = parameters or TaskParameters()
     scene = load_scene(robot, arena, parameters.control_step)
@@ -113,11 +113,11 @@ class FollowWalls(base.Task):
         """Set the task up.
 
         Args:
-          scene: robot and arena.
-          parameters: what a trial is.
-          space: where random starts are drawn, once `starts` are used up.
-          starts: poses `(3,)` of the first episodes: x, y [m], yaw [rad].
-          random: seed of the random starts, or a generator to draw them from.
+            scene: robot and arena.
+            parameters: what a trial is.
+            space: where random starts are drawn, once `starts` are used up.
+            starts: poses `(3,)` of the first episodes: x, y [m], yaw [rad].
+            random: seed of the random starts, or a generator to draw them from.
         """
         super().__init__(random=random)
         self.parameters = parameters

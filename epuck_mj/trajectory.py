@@ -28,15 +28,15 @@ class Trajectory:
     `k + 1` of what is sensed.
 
     Attributes:
-      time: since the start [s], `(T + 1,)`.
-      pose: where the robot was, `(T + 1, 3)`: x, y [m], yaw [rad].
-      distance: along each proximity ray [m], negative where nothing was hit,
-        `(T + 1, 8)`.
-      observation: the same as network input in [0, 1], `(T + 1, 8)`.
-      contact: whether the shell touched a wall, `(T + 1,)`, bool.
-      action: what the policy decided, `(T, 2)`: v in [0, 1], w in [-1, 1].
-      command: wheel speeds sent, left and right [rad/s], `(T, 2)`.
-      fitness: step fitness, `(T,)`.
+        time: since the start [s], `(T + 1,)`.
+        pose: where the robot was, `(T + 1, 3)`: x, y [m], yaw [rad].
+        distance: along each proximity ray [m], negative where nothing was hit,
+            `(T + 1, 8)`.
+        observation: the same as network input in [0, 1], `(T + 1, 8)`.
+        contact: whether the shell touched a wall, `(T + 1,)`, bool.
+        action: what the policy decided, `(T, 2)`: v in [0, 1], w in [-1, 1].
+        command: wheel speeds sent, left and right [rad/s], `(T, 2)`.
+        fitness: step fitness, `(T,)`.
     """
 
     time: np.ndarray
@@ -93,7 +93,7 @@ class Trajectory:
         """Write an .npz; equal trajectories make equal files.
 
         Raises:
-          UserError: if it cannot be written.
+            UserError: if it cannot be written.
         """
         arrays = {field.name: getattr(self, field.name) for field in fields(self)}
         try:
@@ -106,7 +106,7 @@ class Trajectory:
         """Read what `save` wrote.
 
         Raises:
-          UserError: if the file is missing, damaged or something else.
+            UserError: if the file is missing, damaged or something else.
         """
         arrays = read_arrays(Path(path))
         try:
@@ -123,10 +123,10 @@ def record(
     """One trial, ended by a crash or after `task.steps`.
 
     Args:
-      scene: robot and arena.
-      policy: called with observations `(1, 8)`, gives actions `(1, 2)`.
-      start: pose `(3,)`: x, y [m], yaw [rad].
-      task: what a trial is.
+        scene: robot and arena.
+        policy: called with observations `(1, 8)`, gives actions `(1, 2)`.
+        start: pose `(3,)`: x, y [m], yaw [rad].
+        task: what a trial is.
     """
     robots = SimulatedRobots(scene, 1, 1)
     reading = robots.reset(np.asarray(start, float)[None])

@@ -43,9 +43,9 @@ class Champion:
     """The winner of a run.
 
     Attributes:
-      genome: its weights, `(genes,)`.
-      stored_fitness: what evolution believed of it.
-      validation_fitness: its mean on the validation starts.
+        genome: its weights, `(genes,)`.
+        stored_fitness: what evolution believed of it.
+        validation_fitness: its mean on the validation starts.
     """
 
     genome: np.ndarray
@@ -87,10 +87,10 @@ class HeldOut:
     """A champion on the test starts.
 
     Attributes:
-      mean: fitness over the starts.
-      standard_error: of that mean.
-      crash_rate: share of the trials that ended in a crash.
-      starts: how many there were.
+        mean: fitness over the starts.
+        standard_error: of that mean.
+        crash_rate: share of the trials that ended in a crash.
+        starts: how many there were.
     """
 
     mean: float

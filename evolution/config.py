@@ -117,7 +117,7 @@ def find_config(experiment: str) -> Path:
     """The file of a shipped experiment, or the user's own.
 
     Raises:
-      UserError: if there is none.
+        UserError: if there is none.
     """
     shipped = {path.stem: path for path in sorted(CONFIGS.glob("*.yaml"))}
     path = shipped.get(experiment, Path(experiment))
@@ -133,7 +133,7 @@ def load_config(path: Path) -> ExperimentConfig:
     """Read an experiment.
 
     Raises:
-      UserError: if the file is missing, not YAML, or says something unknown.
+        UserError: if the file is missing, not YAML, or says something unknown.
     """
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))

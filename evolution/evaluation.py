@@ -25,9 +25,9 @@ class Evaluation:
     """Trials of `(individuals,)` genomes on `(trials,)` starts.
 
     Attributes:
-      trial_fitness: sum of the step fitness, `(individuals, trials)`.
-      steps: control steps lived, `(individuals, trials)`.
-      crashed: whether a crash ended the trial, `(individuals, trials)`.
+        trial_fitness: sum of the step fitness, `(individuals, trials)`.
+        steps: control steps lived, `(individuals, trials)`.
+        crashed: whether a crash ended the trial, `(individuals, trials)`.
     """
 
     trial_fitness: np.ndarray
@@ -96,10 +96,10 @@ def evaluate(
     """All individuals on all starts.
 
     Args:
-      engine: what runs the trials.
-      network: shape of the genomes.
-      genomes: `(individuals, genes)`.
-      starts: poses `(trials, 3)`, x, y [m], yaw [rad]: the same for everybody.
+        engine: what runs the trials.
+        network: shape of the genomes.
+        genomes: `(individuals, genes)`.
+        starts: poses `(trials, 3)`, x, y [m], yaw [rad]: the same for everybody.
     """
     shape = (len(genomes), len(starts))
     controller = network.decode(np.repeat(genomes, len(starts), axis=0))

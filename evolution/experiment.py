@@ -40,12 +40,12 @@ class Record:
     """One generation, as in history.csv.
 
     Attributes:
-      generation: counted from 0, the initial population.
-      evaluations: individuals evaluated so far.
-      best: highest stored fitness of the population.
-      mean: mean stored fitness of the population.
-      std: its standard deviation.
-      crash_rate: share of this generation's trials that ended in a crash.
+        generation: counted from 0, the initial population.
+        evaluations: individuals evaluated so far.
+        best: highest stored fitness of the population.
+        mean: mean stored fitness of the population.
+        std: its standard deviation.
+        crash_rate: share of this generation's trials that ended in a crash.
     """
 
     generation: int
@@ -68,12 +68,12 @@ class Experiment:
         """Load the scene and draw the first population.
 
         Args:
-          config: what to do.
-          engine: one of `ENGINES`: how trials are stepped, not what they give.
-          threads: of the batch engine; 0 is one per core.
+            config: what to do.
+            engine: one of `ENGINES`: how trials are stepped, not what they give.
+            threads: of the batch engine; 0 is one per core.
 
         Raises:
-          UserError: if robot or arena cannot be used, or the budget is too small.
+            UserError: if robot or arena cannot be used, or the budget is too small.
         """
         self.config = config
         self.scene = load_scene(config.robot, config.arena, config.control_step)
@@ -140,7 +140,7 @@ class Experiment:
         """Go on from a `state`.
 
         Raises:
-          ValueError: if it does not belong to this experiment.
+            ValueError: if it does not belong to this experiment.
         """
         prefix = "optimizer."
         for name in ("records", "best_genomes"):
@@ -180,7 +180,7 @@ def make_engine(
     """The engine of that name.
 
     Raises:
-      UserError: if there is none.
+        UserError: if there is none.
     """
     if name == "batch":
         return BatchEngine(scene, config.task, threads)

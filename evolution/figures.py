@@ -41,11 +41,11 @@ def fitness_figure(
     """Stored fitness against evaluations, as in figures 3 to 5 of the paper.
 
     Args:
-      evaluations: individuals evaluated so far, `(generations,)`.
-      best: highest stored fitness of each generation, `(generations,)`.
-      mean: mean stored fitness of each generation, `(generations,)`.
-      title: above the axes.
-      steps: control steps of a trial, the highest fitness there is.
+        evaluations: individuals evaluated so far, `(generations,)`.
+        best: highest stored fitness of each generation, `(generations,)`.
+        mean: mean stored fitness of each generation, `(generations,)`.
+        title: above the axes.
+        steps: control steps of a trial, the highest fitness there is.
     """
     figure = Figure(figsize=(6, 3.7), layout="constrained")
     axes = figure.add_subplot()
@@ -74,13 +74,13 @@ def trajectory_figure(
     """The arena from above with the path of each trajectory, side by side.
 
     Args:
-      scene: where the trajectories were recorded.
-      trajectories: one panel each.
-      task: what the trials were.
-      titles: one per trajectory.
+        scene: where the trajectories were recorded.
+        trajectories: one panel each.
+        task: what the trials were.
+        titles: one per trajectory.
 
     Raises:
-      ValueError: if there is no trajectory, or another number of titles.
+        ValueError: if there is no trajectory, or another number of titles.
     """
     if not trajectories or len(titles) != len(trajectories):
         raise ValueError(
@@ -142,7 +142,7 @@ def save_figure(figure: Figure, path: str | Path) -> None:
     """Write a PNG at 150 dpi; equal figures make equal files.
 
     Raises:
-      UserError: if it cannot be written.
+        UserError: if it cannot be written.
     """
     picture = io.BytesIO()
     # matplotlib would name its version

@@ -28,12 +28,12 @@ def write_results(
     """Choose the champion, test it, and write everything that shows it.
 
     Args:
-      experiment: a finished run.
-      directory: where to write.
-      threads: that step the robots; 0 is one per core.
+        experiment: a finished run.
+        directory: where to write.
+        threads: that step the robots; 0 is one per core.
 
     Returns:
-      The champion as written, with its scores.
+        The champion as written, with its scores.
     """
     config = experiment.config
     champion = choose_champion(

@@ -33,7 +33,7 @@ class RunDirectory:
         """Refuse a directory that holds anything.
 
         Raises:
-          UserError: if it does, or is not a directory.
+            UserError: if it does, or is not a directory.
         """
         if self.path.exists() and not self.path.is_dir():
             raise UserError(f"output '{self.path}' is not a directory")
@@ -47,7 +47,7 @@ class RunDirectory:
         """Make the directory and write down what is about to happen.
 
         Raises:
-          UserError: if it cannot be written.
+            UserError: if it cannot be written.
         """
         self.refuse_if_used()
         try:
@@ -63,7 +63,7 @@ class RunDirectory:
         """The config of the run that is there.
 
         Raises:
-          UserError: if there is none.
+            UserError: if there is none.
         """
         if not self.config.is_file():
             raise UserError(f"nothing to resume: no '{self.config}'")
@@ -73,7 +73,7 @@ class RunDirectory:
         """Refuse to go on with a changed config.
 
         Raises:
-          UserError: naming the keys that differ.
+            UserError: naming the keys that differ.
         """
         stored = _flat(self.stored_config())
         asked = _flat(config)
@@ -92,7 +92,7 @@ class RunDirectory:
         """Put the experiment where the checkpoint is; at its start if there is none.
 
         Raises:
-          UserError: if the checkpoint cannot be read or belongs to something else.
+            UserError: if the checkpoint cannot be read or belongs to something else.
         """
         if self.checkpoint.exists():
             state = files.read_arrays(self.checkpoint)
@@ -112,7 +112,7 @@ class RunDirectory:
         """Checkpoint, then what can be derived from it; `seconds` of this generation.
 
         Raises:
-          UserError: if the directory can no longer be written.
+            UserError: if the directory can no longer be written.
         """
         try:
             files.write_arrays(self.checkpoint, experiment.state())

@@ -187,6 +187,13 @@ def test_an_arena_with_another_include_and_its_own_robot_file(tmp_path):
     assert scene.model.nq == 3
 
 
+@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
+def test_a_copied_arena_needs_no_copied_robot(tmp_path, robot):
+    path = tmp_path / "copy.xml"
+    path.write_text((MODELS / "arena.xml").read_text())
+    assert load_scene(robot, str(path)).robot == MODELS / f"{robot}.xml"
+
+
 def refusal(robot="epuck", arena="arena", control_step=0.1) -> str:
     with pytest.raises(UserError) as error:
         load_scene(str(robot), str(arena), control_step)

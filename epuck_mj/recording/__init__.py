@@ -53,15 +53,15 @@ def save_recording(
     """Write a trial as .rrd.
 
     Args:
-      path: of the file.
-      scene: where the trajectory was recorded.
-      trajectory: what happened.
-      task: what the trial was.
-      title: one line, the recording's name.
-      summary: Markdown for the text panel.
+        path: of the file.
+        scene: where the trajectory was recorded.
+        trajectory: what happened.
+        task: what the trial was.
+        title: one line, the recording's name.
+        summary: Markdown for the text panel.
 
     Raises:
-      UserError: if it cannot be written.
+        UserError: if it cannot be written.
     """
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "recording.rrd")
