@@ -17,8 +17,19 @@ from epuck_mj.errors import UserError
 Options = TypeVar("Options")
 
 
-def parse(default: Options, prog: str, argv: Sequence[str]) -> Options:
-    """The options in `argv`, on top of `default`, whose fields are the flags.
+def parse(
+    kind: type[Options],
+    prog: str,
+    argv: Sequence[str],
+    default: Options | None = None,
+) -> Options:
+    """The options in `argv`; the fields of `kind` are the flags.
+
+    Args:
+        kind: dataclass of the options.
+        prog: how a person calls the program.
+        argv: what was typed behind it.
+        default: options that flags change; None takes the defaults of `kind`.
 
     Raises:
         UserError: if the arguments cannot be understood.
@@ -28,8 +39,8 @@ def parse(default: Options, prog: str, argv: Sequence[str]) -> Options:
     try:
         with contextlib.redirect_stderr(box):
             return tyro.cli(
-                type(default),
-                default=default,
+                kind,
+                default=tyro.MISSING if default is None else default,
                 prog=prog,
                 args=list(argv),
                 config=(
@@ -46,10 +57,15 @@ def parse(default: Options, prog: str, argv: Sequence[str]) -> Options:
 
 def _unboxed(text: str) -> str:
     """The message of tyro's box of several lines, on one and without its extras."""
-    lines = [line.strip("│ ") for line in text.splitlines() if line.startswith("│")]
-    # what follows the first rule is help
-    rules = [i for i, line in enumerate(lines) if set(line) == {"─"}]
-    message = " ".join(lines[: rules[0]] if rules else lines)
+    drawn = "│" in text
+    lines = [
+        line.strip("│ ") for line in text.splitlines() if line[:1] not in ("╭", "╰")
+    ]
+    rules = [i for i, line in enumerate(lines) if line and set(line) <= {"─", "-"}]
+    # without Unicode there is no box, and the title has a rule as well
+    first = 0 if drawn or not rules else rules.pop(0) + 1
+    # what follows the next rule is help
+    message = " ".join(filter(None, lines[first : rules[0] if rules else None]))
     for pattern, replacement in EXTRAS:
         message = re.sub(pattern, replacement, message)
     return message
@@ -71,6 +87,8 @@ def main(run: Callable[[Sequence[str]], int]) -> None:
     except UserError as error:
         print(f"error: {error}", file=sys.stderr)
         status = 2
+    except KeyboardInterrupt:
+        status = 130
     except BrokenPipeError:
         # whoever reads has gone; python's own flush at exit must not complain
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -4,7 +4,8 @@ import io
 import os
 import tempfile
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from tokenize import TokenError
 
@@ -41,6 +42,34 @@ def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
     write_bytes(path, buffer.getvalue())
 
 
+def is_file(path: Path) -> bool:
+    """Whether a file is there; False as well for what cannot be a file's name."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+@contextmanager
+def writing(folder: Path) -> Iterator[None]:
+    """What cannot be written in the block is the user's to put right.
+
+    Raises:
+        UserError: naming the file.
+    """
+    try:
+        yield
+    except OSError as error:
+        name = error.filename2 or error.filename or folder
+        raise UserError(f"cannot write '{name}': {error.strerror}") from None
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove temporary files of writers that were killed."""
+    for path in folder.glob(".*-????????"):
+        path.unlink(missing_ok=True)
+
+
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """The arrays of an .npz file.
 
@@ -62,7 +91,15 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         raise UserError(f"cannot read '{path}': {reason}") from None
 
 
-DAMAGED = (TypeError, ValueError, EOFError, OSError, zipfile.BadZipFile, TokenError)
+DAMAGED = (
+    TypeError,
+    ValueError,
+    EOFError,
+    OSError,
+    RuntimeError,
+    zipfile.BadZipFile,
+    TokenError,
+)
 """What numpy and zipfile raise for damaged archives."""
 
 

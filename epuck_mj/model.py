@@ -7,6 +7,7 @@ differ in their base and nothing else: everybody else calls `Scene.qpos` and fri
 
 import hashlib
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,10 +17,12 @@ import numpy as np
 
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
+from epuck_mj.files import is_file
 from epuck_mj.sensors import Reading
 
 MODELS = Path(__file__).resolve().parent.parent / "models"
 SHIPPED_ROBOTS = ("epuck.xml", "epuck_planar.xml")
+ADDED_ROBOT = "robot added to the arena.xml"
 ROBOT_BODY = "epuck"
 SHELL = "shell"
 TIMESTEP = "timestep"
@@ -39,6 +42,7 @@ class Scene:
         wheels: indices of the wheels' actuators, left and right, `(2,)`.
         robot: path of the robot's MJCF.
         arena: path of the arena's MJCF.
+        sha256: of each text compiled: `arena`, `robot`, and every include by name.
     """
 
     model: mujoco.MjModel
@@ -46,6 +50,7 @@ class Scene:
     wheels: np.ndarray
     robot: Path
     arena: Path
+    sha256: Mapping[str, str]
     _distance: np.ndarray
     _contact: int
 
@@ -87,13 +92,6 @@ class Scene:
             sensordata[..., self._distance], sensordata[..., self._contact] > 0
         )
 
-    def hashes(self) -> dict[str, str]:
-        """SHA-256 of the MJCF of arena and robot, by file name."""
-        return {
-            path.name: hashlib.sha256(path.read_bytes()).hexdigest()
-            for path in (self.arena, self.robot)
-        }
-
 
 def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
     """Put a robot into an arena.
@@ -113,17 +111,30 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
     # compiled alone first: errors in an included file have no line number
     _compile(mujoco.MjSpec.from_file, str(robot_path), source=robot_path)
     text, files = _with_robot(arena_path, robot_path)
+    robot_text = _read(robot_path).encode()
+    texts = {"arena": text.encode(), "robot": robot_text}
+    texts |= {name: file for name, file in files.items() if file != robot_text}
     model = _compile(
         lambda: mujoco.MjSpec.from_string(text, include=files), source=arena_path
     )
-    return _index(model, robot_path, arena_path, control_step)
+    sha256 = {
+        name: hashlib.sha256(content).hexdigest() for name, content in texts.items()
+    }
+    return _index(model, robot_path, arena_path, sha256, control_step)
+
+
+def absolute(name: str) -> str:
+    """The name of a robot or arena; if it is a path, from the root on."""
+    path = Path(name)
+    shipped = {file.stem for file in MODELS.rglob("*.xml")}
+    return name if name in shipped or not is_file(path) else str(path.resolve())
 
 
 def _find(name: str, kind: str, shipped: list[Path]) -> Path:
     """The file of a shipped model, or the user's own."""
     by_name = {path.stem: path for path in shipped}
     path = by_name.get(name, Path(name))
-    if path.is_file():
+    if is_file(path):
         return path.resolve()
     available = ", ".join(by_name)
     raise UserError(
@@ -149,9 +160,9 @@ def _with_robot(arena: Path, robot: Path) -> tuple[str, dict[str, bytes]]:
             "only, or a robot by <include>"
         )
     # walls only: the robot goes last, so line numbers stay
-    files[robot.name] = _read(robot).encode()
+    files[ADDED_ROBOT] = _read(robot).encode()
     head, _, tail = text.rpartition("</mujoco>")
-    return f'{head}<include file="{robot.name}"/></mujoco>{tail}', files
+    return f'{head}<include file="{ADDED_ROBOT}"/></mujoco>{tail}', files
 
 
 def _read(path: Path) -> str:
@@ -193,7 +204,11 @@ def _compile(make_spec, *args, source: Path) -> mujoco.MjModel:
 
 
 def _index(
-    model: mujoco.MjModel, robot: Path, arena: Path, control_step: float
+    model: mujoco.MjModel,
+    robot: Path,
+    arena: Path,
+    sha256: Mapping[str, str],
+    control_step: float,
 ) -> Scene:
     """The scene of a compiled model that has all of the robot's parts."""
     _check_base(model, robot)
@@ -203,6 +218,11 @@ def _index(
         _sensor(model, name, _SENSOR.mjSENS_RANGEFINDER, robot) for name in PROXIMITY
     ]
     contact = _sensor(model, SHELL, _SENSOR.mjSENS_CONTACT, robot)
+    if model.opt.timestep <= 0:
+        raise UserError(
+            f"arena '{arena}': expected a physics step above 0 s, "
+            f"got {model.opt.timestep:g} s"
+        )
     ratio = control_step / model.opt.timestep
     n_substeps = round(ratio)
     if n_substeps < 1 or abs(ratio - n_substeps) > 1e-8:
@@ -216,6 +236,7 @@ def _index(
         np.array(wheels),
         robot,
         arena,
+        sha256,
         np.array(distance),
         contact,
     )

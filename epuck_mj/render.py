@@ -8,7 +8,6 @@ import copy
 import importlib
 import io
 import os
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from ctypes.util import find_library
@@ -21,6 +20,7 @@ import tyro
 from matplotlib.image import imsave
 
 from epuck_mj.colors import HIGH_FITNESS, LOW_FITNESS, blend
+from epuck_mj.command_line import main, parse
 from epuck_mj.control import TaskParameters
 from epuck_mj.controller import load
 from epuck_mj.errors import UserError
@@ -181,12 +181,13 @@ def _add_path(view: mujoco.MjvScene, trajectory: Trajectory) -> None:
         view.ngeom += 1
 
 
-def run(options: Options) -> None:
-    """Draw and write the picture.
+def run(argv: Sequence[str]) -> int:
+    """Draw and write the picture; the exit status.
 
     Raises:
         UserError: for anything a user can put right.
     """
+    options = parse(Options, "python -m epuck_mj.render", argv)
     file = load(options.champion)
     task = TaskParameters.from_dict(file.task)
     steps = round(options.seconds / task.control_step)
@@ -213,18 +214,8 @@ def run(options: Options) -> None:
         f"{options.output}: fitness {trajectory.trial_fitness:.1f} of {steps}"
         + (f", crash after {trajectory.steps} steps" if trajectory.crashed else "")
     )
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Exit status of the command line; 2, after one clear line, for bad input."""
-    options = tyro.cli(Options, prog="python -m epuck_mj.render", args=argv)
-    try:
-        run(options)
-    except UserError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main(run)

@@ -11,6 +11,7 @@ from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
 from epuck_mj.control import TaskParameters
 from epuck_mj.controller import Network
 from epuck_mj.errors import UserError
+from epuck_mj.files import is_file
 from epuck_mj.motors import Speeds
 from epuck_mj.tasks import START_CLEARANCE
 from evolution.optimizer import (
@@ -71,13 +72,18 @@ class ExperimentConfig(BaseModel):
         PROXIMITY_RANGE, gt=0, description="range of the proximity sensors [m]"
     )
     start_clearance: float = Field(
-        START_CLEARANCE, gt=0, description="least distance to a wall at a start [m]"
+        START_CLEARANCE,
+        gt=0,
+        le=1,
+        description="least distance to a wall at a start [m]",
     )
     hidden: int = Field(4, ge=1, description="hidden neurons")
     biases: bool = Field(False, description="give hidden and output neurons a bias")
-    weight_bound: float = Field(5.0, gt=0, description="weights stay within +- this")
+    weight_bound: float = Field(
+        5.0, gt=0, le=1e6, description="weights stay within +- this"
+    )
     weight_init: float = Field(
-        5.0, gt=0, description="first weights are uniform within +- this"
+        5.0, gt=0, le=1e6, description="first weights are uniform within +- this"
     )
     optimizer: OptimizerConfig
 
@@ -121,7 +127,7 @@ def find_config(experiment: str) -> Path:
     """
     shipped = {path.stem: path for path in sorted(CONFIGS.glob("*.yaml"))}
     path = shipped.get(experiment, Path(experiment))
-    if path.is_file():
+    if is_file(path):
         return path
     raise UserError(
         f"no experiment '{experiment}': expected the path of a YAML file or one of "
@@ -139,7 +145,7 @@ def load_config(path: Path) -> ExperimentConfig:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise UserError(f"cannot read '{path}': {error}") from None
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise UserError(f"'{path}' is not YAML: {' '.join(str(error).split())}") from (
             None
         )

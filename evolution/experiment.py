@@ -56,6 +56,9 @@ class Record:
     crash_rate: float
 
 
+ARRAYS = {"records": len(Record.__dataclass_fields__), "best_genomes": None}
+"""Arrays of a state, one row per generation, and their columns (None: genes)."""
+
 HISTORY_HEADER = ",".join(Record.__dataclass_fields__)
 
 
@@ -143,9 +146,7 @@ class Experiment:
             ValueError: if it does not belong to this experiment.
         """
         prefix = "optimizer."
-        for name in ("records", "best_genomes"):
-            if name not in state:
-                raise ValueError(f"expected an array '{name}', got {', '.join(state)}")
+        records, genomes = (self._array(state, name) for name in ARRAYS)
         self.optimizer.restore(
             {
                 name.removeprefix(prefix): array
@@ -155,9 +156,21 @@ class Experiment:
         )
         self.records = [
             Record(int(generation), int(evaluations), *map(float, rest))
-            for generation, evaluations, *rest in state["records"]
+            for generation, evaluations, *rest in records
         ]
-        self.best_genomes = list(state["best_genomes"])
+        self.best_genomes = list(genomes)
+
+    def _array(self, state: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+        """A float array of a state, one row per generation told."""
+        generations = int(state.get("optimizer.generation", 0))
+        expected = (generations, ARRAYS[name] or self.config.network.n_genes)
+        array = state.get(name)
+        if array is None or array.shape != expected or generations < 1:
+            got = "none" if array is None else f"shape {array.shape}"
+            raise ValueError(
+                f"expected an array '{name}' of shape {expected}, got {got}"
+            )
+        return array
 
     def history(self) -> str:
         """Text of history.csv: no clock in it, floats that read back exactly."""

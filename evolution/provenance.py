@@ -32,7 +32,7 @@ def provenance(
             **{package: version(package) for package in PACKAGES},
         },
         "git": _git(),
-        "mjcf_sha256": scene.hashes(),
+        "mjcf_sha256": dict(scene.sha256),
         "platform": platform.platform(),
         "processor": _processor(),
         "started": now(),

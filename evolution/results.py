@@ -1,6 +1,10 @@
 """What a finished run shows: its champion, judged by fresh starts, drawn and logged."""
 
+from collections.abc import Mapping
 from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
 
 from epuck_mj import files
 from epuck_mj.controller import ControllerFile
@@ -8,8 +12,13 @@ from epuck_mj.model import Scene, load_scene
 from epuck_mj.recording import save_recording
 from epuck_mj.starts import FreeSpace
 from epuck_mj.trajectory import record
-from evolution.champion import Champion, HeldOut, choose_champion, held_out
-from evolution.champion import starts_for_test as test_starts
+from evolution.champion import (
+    Champion,
+    HeldOut,
+    choose_champion,
+    held_out,
+    starts_for_test,
+)
 from evolution.evaluation import BatchEngine
 from evolution.experiment import Experiment
 from evolution.figures import fitness_figure, save_figure, trajectory_figure
@@ -22,13 +31,30 @@ N_SHOWN = 4
 """Trials of the champion in the picture; the first is also the recording."""
 
 
+def reported_scenes(experiment: Experiment) -> dict[str, Scene]:
+    """The robots that the champion is tested on: its own, and the one on wheels.
+
+    Raises:
+        UserError: if the wheeled robot cannot use the arena.
+    """
+    config = experiment.config
+    wheeled = load_scene(WHEELED_ROBOT, config.arena, config.control_step)
+    if experiment.scene.robot == wheeled.robot:
+        return {WHEELED_ROBOT: wheeled}
+    return {Path(config.robot).name: experiment.scene, WHEELED_ROBOT: wheeled}
+
+
 def write_results(
-    experiment: Experiment, directory: RunDirectory, threads: int = 0
+    experiment: Experiment,
+    scenes: Mapping[str, Scene],
+    directory: RunDirectory,
+    threads: int = 0,
 ) -> ControllerFile:
     """Choose the champion, test it, and write everything that shows it.
 
     Args:
         experiment: a finished run.
+        scenes: robots to test it on, as of `reported_scenes`.
         directory: where to write.
         threads: that step the robots; 0 is one per core.
 
@@ -39,13 +65,8 @@ def write_results(
     champion = choose_champion(
         BatchEngine(experiment.scene, config.task, threads), experiment
     )
-    scenes = {config.robot: experiment.scene}
-    if config.robot != WHEELED_ROBOT:
-        scenes[WHEELED_ROBOT] = load_scene(
-            WHEELED_ROBOT, config.arena, config.control_step
-        )
     starts = {
-        robot: test_starts(FreeSpace(scene, config.start_clearance))
+        robot: starts_for_test(FreeSpace(scene, config.start_clearance))
         for robot, scene in scenes.items()
     }
     tests = {
@@ -91,7 +112,7 @@ def _controller_file(
         scene={
             "robot": config.robot,
             "arena": config.arena,
-            "mjcf_sha256": experiment.scene.hashes(),
+            "mjcf_sha256": dict(experiment.scene.sha256),
         },
         scores={
             "stored": champion.stored_fitness,
@@ -118,7 +139,7 @@ def _show(
     directory: RunDirectory,
     controller: ControllerFile,
     scene: Scene,
-    starts,
+    starts: np.ndarray,
 ) -> None:
     """Trials of the champion on the wheeled robot: picture, file and recording."""
     task = experiment.config.task

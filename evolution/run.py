@@ -4,9 +4,9 @@ import argparse
 import signal
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -14,6 +14,8 @@ import tyro
 
 from epuck_mj.command_line import command, main, parse
 from epuck_mj.errors import UserError
+from epuck_mj.files import writing
+from epuck_mj.model import Scene, absolute
 from evolution.config import (
     DEFAULT_EXPERIMENT,
     ExperimentConfig,
@@ -23,10 +25,11 @@ from evolution.config import (
 from evolution.experiment import Experiment
 from evolution.progress import Progress
 from evolution.provenance import provenance
-from evolution.results import summary, write_results
+from evolution.results import reported_scenes, summary, write_results
 from evolution.run_directory import RunDirectory
 
 MODULE = "evolution.run"
+THREADS_MAX = 1024
 
 
 @dataclass(frozen=True)
@@ -64,8 +67,10 @@ def run(argv: Sequence[str]) -> int:
     if options.print_config:
         print(options.config.to_yaml(), end="")
         return 0
-    if options.threads < 0:
-        raise UserError(f"expected threads of at least 0, got {options.threads}")
+    if not 0 <= options.threads <= THREADS_MAX:
+        raise UserError(
+            f"expected threads from 0 to {THREADS_MAX}, got {options.threads}"
+        )
     if options.resume is not None:
         directory = RunDirectory(options.resume)
         directory.refuse_other_config(options.config)
@@ -78,12 +83,14 @@ def run(argv: Sequence[str]) -> int:
         directory = RunDirectory(options.output or default)
         directory.refuse_if_used()
     experiment = Experiment(options.config, options.engine, options.threads)
+    # found out now, not after the evolution
+    scenes = reported_scenes(experiment)
     source = provenance(experiment.scene, argv, options.engine, options.threads)
     if options.resume is not None:
         directory.restore(experiment, source)
     else:
         directory.create(options.config, source)
-    return _carry_out(experiment, directory, options.threads)
+    return _carry_out(experiment, scenes, directory, options.threads)
 
 
 def _options(argv: Sequence[str]) -> Options:
@@ -97,23 +104,38 @@ def _options(argv: Sequence[str]) -> Options:
         config = RunDirectory(resume).stored_config()
     else:
         config = load_config(find_config(experiment))
-    options = parse(Options(experiment, config), prog=f"python -m {MODULE}", argv=argv)
+    default = Options(experiment, config)
+    options = parse(Options, f"python -m {MODULE}", argv, default)
     if options.experiment != experiment:
         raise UserError(
             f"the experiment comes first: {command(MODULE, options.experiment, '...')}"
         )
+    # a run can be resumed from anywhere
+    config = options.config.model_copy(
+        update={
+            "robot": absolute(options.config.robot),
+            "arena": absolute(options.config.arena),
+        }
+    )
+    options = replace(options, config=config)
     if options.resume is not None and options.output is not None:
         raise UserError("expected --resume or --output, got both")
     return options
 
 
-def _carry_out(experiment: Experiment, directory: RunDirectory, threads: int) -> int:
+def _carry_out(
+    experiment: Experiment,
+    scenes: Mapping[str, Scene],
+    directory: RunDirectory,
+    threads: int,
+) -> int:
     """Evolve, then choose and show the champion; the exit status."""
     started = time.monotonic()
     try:
         with _interruptible():
             _evolve(experiment, directory)
-            controller = write_results(experiment, directory, threads)
+            with writing(directory.path):
+                controller = write_results(experiment, scenes, directory, threads)
             directory.mark_finished()
     except _Interrupted as interruption:
         print(
@@ -164,11 +186,10 @@ def _interruptible() -> Iterator[None]:
         raise _Interrupted(signum)
 
     previous = {signum: signal.signal(signum, interrupt) for signum in signums}
-    try:
-        yield
-    finally:
-        for signum, handler in previous.items():
-            signal.signal(signum, handler)
+    yield
+    # after an interruption, they stay ignored until the process ends
+    for signum, handler in previous.items():
+        signal.signal(signum, handler)
 
 
 def _replay(directory: RunDirectory) -> str:

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import yaml
 
 from epuck_mj import files
@@ -35,9 +36,15 @@ class RunDirectory:
         Raises:
             UserError: if it does, or is not a directory.
         """
-        if self.path.exists() and not self.path.is_dir():
+        try:
+            used = self.path.is_dir() and bool(self._visible())
+        except OSError as error:
+            raise UserError(
+                f"cannot write output '{self.path}': {error.strerror}"
+            ) from None
+        if files.is_file(self.path):
             raise UserError(f"output '{self.path}' is not a directory")
-        if self.path.is_dir() and any(self.path.iterdir()):
+        if used:
             raise UserError(
                 f"output '{self.path}' is not empty: expected a new directory, or "
                 f"--resume {self.path} to go on with what is there"
@@ -50,14 +57,11 @@ class RunDirectory:
             UserError: if it cannot be written.
         """
         self.refuse_if_used()
-        try:
+        with files.writing(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
+            files.remove_leftovers(self.path)
             files.write_text(self.config, config.to_yaml())
             files.write_text(self.provenance, to_json(provenance))
-        except OSError as error:
-            raise UserError(
-                f"cannot write output '{self.path}': {error.strerror}"
-            ) from None
 
     def stored_config(self) -> ExperimentConfig:
         """The config of the run that is there.
@@ -65,7 +69,7 @@ class RunDirectory:
         Raises:
             UserError: if there is none.
         """
-        if not self.config.is_file():
+        if not files.is_file(self.config):
             raise UserError(f"nothing to resume: no '{self.config}'")
         return load_config(self.config)
 
@@ -92,30 +96,47 @@ class RunDirectory:
         """Put the experiment where the checkpoint is; at its start if there is none.
 
         Raises:
-            UserError: if the checkpoint cannot be read or belongs to something else.
+            UserError: if the checkpoint cannot be read or belongs to something else,
+                or the models have been edited since.
         """
+        first = self._stored_provenance() or provenance
+        self._refuse_other_models(first, provenance)
         if self.checkpoint.exists():
             state = files.read_arrays(self.checkpoint)
             try:
+                if str(state.pop("config", "")) != experiment.config.to_yaml():
+                    raise ValueError("it was made with another config")
                 experiment.restore(state)
             except ValueError as error:
                 raise UserError(
                     f"'{self.checkpoint}' is not a checkpoint of this run: {error}"
                 ) from None
+        with files.writing(self.path):
+            files.remove_leftovers(self.path)
             # the run may have been killed between its two files
             files.write_text(self.history, experiment.history())
-        first = self._stored_provenance() or provenance
-        resumed = [*first.get("resumed", ()), provenance]
-        files.write_text(self.provenance, to_json({**first, "resumed": resumed}))
+            resumed = [*first.get("resumed", ()), provenance]
+            files.write_text(self.provenance, to_json({**first, "resumed": resumed}))
+
+    def _refuse_other_models(self, first: dict, now: dict) -> None:
+        before, after = first.get("mjcf_sha256"), now["mjcf_sha256"]
+        if before != after:
+            raise UserError(
+                f"cannot resume '{self.path}': its robot or arena has been edited "
+                f"since (SHA-256 {before}, now {after})"
+            )
 
     def save(self, experiment: Experiment, seconds: float) -> None:
         """Checkpoint, then what can be derived from it; `seconds` of this generation.
 
         Raises:
-            UserError: if the directory can no longer be written.
+            UserError: if the directory can no longer be written; what was there
+                before is intact.
         """
+        config = np.array(experiment.config.to_yaml())
         try:
-            files.write_arrays(self.checkpoint, experiment.state())
+            state = {"config": config, **experiment.state()}
+            files.write_arrays(self.checkpoint, state)
             files.write_text(self.history, experiment.history())
             with self.timing.open("a", encoding="utf-8") as file:
                 if file.tell() == 0:
@@ -135,17 +156,34 @@ class RunDirectory:
     def mark_finished(self) -> None:
         """Write down when everything was there."""
         fields = self._stored_provenance() | {"finished": now()}
-        files.write_text(self.provenance, to_json(fields))
+        with files.writing(self.path):
+            files.write_text(self.provenance, to_json(fields))
 
     def contents(self) -> str:
         """Names of the files, for a person."""
-        return ", ".join(sorted(path.name for path in self.path.iterdir()))
+        return ", ".join(self._visible())
+
+    def _visible(self) -> list[str]:
+        names = (path.name for path in self.path.iterdir())
+        return sorted(name for name in names if not name.startswith("."))
 
     def _stored_provenance(self) -> dict:
-        """What is known of the run's beginning; empty if it was killed before."""
+        """What is known of the run's beginning; empty if it was killed before.
+
+        Raises:
+            UserError: if it is damaged.
+        """
         if not self.provenance.is_file():
             return {}
-        return json.loads(self.provenance.read_text(encoding="utf-8"))
+        try:
+            fields = json.loads(self.provenance.read_text(encoding="utf-8"))
+            if not isinstance(fields, dict):
+                raise ValueError("not an object")
+            if not isinstance(fields.get("resumed", []), list):
+                raise ValueError("'resumed' is not a list")
+        except (OSError, ValueError) as error:
+            raise UserError(f"cannot read '{self.provenance}': {error}") from None
+        return fields
 
 
 def _flat(config: ExperimentConfig) -> dict:

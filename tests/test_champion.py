@@ -1,0 +1,301 @@
+"""The champion: who may be it, who is it, and what fresh starts say of it."""
+
+import math
+import statistics
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from epuck_mj import controller, files
+from epuck_mj.control import control_step
+from epuck_mj.sensors import observe
+from epuck_mj.simulation import SimulatedRobots
+from evolution import champion as champion_module
+from evolution import results
+from evolution.champion import (
+    LATEST_BEST,
+    candidates,
+    choose_champion,
+    held_out,
+    starts_for_test,
+    starts_for_validation,
+)
+from evolution.config import ExperimentConfig, find_config, load_config
+from evolution.experiment import Experiment, Record
+from evolution.results import reported_scenes, summary, write_results
+from evolution.run_directory import RunDirectory
+
+SHIPPED = ("de-best", "de-rand", "ga")
+
+
+def tiny(name: str, population: int = 20, **update) -> ExperimentConfig:
+    config = load_config(find_config(name))
+    optimizer = replace(config.optimizer, population=population)
+    update = {"evaluations": 6 * population, "steps": 25, "trials": 2} | update
+    return config.model_copy(update={"optimizer": optimizer} | update)
+
+
+@pytest.fixture(scope="module", params=SHIPPED)
+def finished(request):
+    """A finished run of each algorithm, and what it was after each generation."""
+    experiment = Experiment(tiny(request.param), threads=1)
+    generations = [
+        (experiment.optimizer.population.copy(), experiment.optimizer.fitness.copy())
+        for _ in experiment.run()
+    ]
+    return experiment, generations
+
+
+def slow_trial(experiment: Experiment, genome, start) -> tuple[float, bool]:
+    """Fitness of a genome's trial on one start, alone, and whether it crashed."""
+    task = experiment.config.task
+    policy = experiment.config.network.decode(genome)
+    robots = SimulatedRobots(experiment.scene, 1, 1)
+    observation = observe(robots.reset(start[None]).distance, task.sensor_range)
+    fitness = 0.0
+    for _ in range(task.steps):
+        step = control_step(robots, policy, observation, task)
+        if step.reading.contact[0]:
+            return fitness, True
+        fitness += float(step.fitness[0])
+        observation = step.observation
+    return fitness, False
+
+
+# candidates
+
+
+def slow_candidates(generations, share=0.1) -> dict[tuple, set[float]]:
+    """Genomes that may be champion, each with the fitness it was ever stored with."""
+    population, fitness = generations[-1]
+    allowed: dict[tuple, set[float]] = {}
+    ranked = sorted(range(len(fitness)), key=lambda i: (-fitness[i], i))
+    for i in ranked[: round(share * len(fitness))]:
+        allowed.setdefault(tuple(population[i]), set()).add(fitness[i])
+    best_so_far = -math.inf
+    for population, fitness in generations:
+        i = max(range(len(fitness)), key=lambda i: (fitness[i], -i))
+        if fitness[i] > best_so_far:
+            best_so_far = fitness[i]
+            allowed.setdefault(tuple(population[i]), set()).add(fitness[i])
+    return allowed
+
+
+def test_candidates_are_the_top_tenth_and_the_best_so_far(finished):
+    experiment, generations = finished
+    genomes, stored = candidates(experiment)
+    expected = slow_candidates(generations)
+    found = [tuple(genome) for genome in genomes]
+    assert len(found) == len(set(found))
+    assert set(found) == set(expected)
+    for genome, fitness in zip(found, stored, strict=True):
+        assert fitness in expected[genome]
+    # or one of the two kinds would not be tested
+    assert len(found) > 2
+
+
+def test_the_latest_twenty_of_the_best_so_far_are_candidates():
+    experiment = Experiment(tiny("ga"))
+    rng, genes = np.random.default_rng(1), experiment.config.network.n_genes
+    told = rng.random(20)
+    experiment.optimizer.ask()
+    experiment.optimizer.tell(told)
+    n = LATEST_BEST + 5
+    # each generation raises the best; after it two that do not
+    for i in range(n):
+        for best in (10.0 + i, 10.0 + i, 5.0):
+            record = Record(len(experiment.records), 0, best, 0.0, 0.0, 0.0)
+            experiment.records.append(record)
+            experiment.best_genomes.append(rng.random(genes))
+    genomes, stored = candidates(experiment)
+    top = sorted(told, reverse=True)[:2]
+    assert stored.tolist() == top + [10.0 + i for i in range(5, n)]
+    latest = np.array(experiment.best_genomes)[15::3]
+    np.testing.assert_array_equal(genomes[2:], latest)
+
+
+def test_a_genome_that_is_both_is_one_candidate():
+    experiment = Experiment(tiny("ga"))
+    next(experiment.run())
+    population, fitness = experiment.optimizer.population, experiment.optimizer.fitness
+    order = np.argsort(-fitness, kind="stable")[:2]
+    genomes, stored = candidates(experiment)
+    np.testing.assert_array_equal(genomes, population[order])
+    np.testing.assert_array_equal(stored, fitness[order])
+
+
+@pytest.mark.parametrize(("population", "n"), [(4, 1), (14, 1), (16, 2), (31, 3)])
+def test_the_tenth_is_rounded_and_at_least_one(population, n):
+    experiment = Experiment(tiny("ga", population=population))
+    fitness = np.random.default_rng(2).permutation(population).astype(float)
+    experiment.optimizer.ask()
+    experiment.optimizer.tell(fitness)
+    record = Record(0, population, fitness.max(), 0.0, 0.0, 0.0)
+    experiment.records.append(record)
+    experiment.best_genomes.append(experiment.optimizer.population[fitness.argmax()])
+    _, stored = candidates(experiment)
+    assert stored.tolist() == sorted(fitness, reverse=True)[:n]
+
+
+# the choice
+
+
+def test_the_champion_is_best_on_the_validation_starts(finished, monkeypatch):
+    # the first starts are enough for a slow loop
+    monkeypatch.setattr(champion_module, "N_VALIDATION", 12)
+    experiment, _ = finished
+    starts = starts_for_validation(experiment.space)
+    assert starts.shape == (12, 3)
+    genomes, stored = candidates(experiment)
+    means = [
+        np.mean([slow_trial(experiment, genome, start)[0] for start in starts])
+        for genome in genomes
+    ]
+    best = max(range(len(means)), key=lambda i: (means[i], -i))
+    champion = choose_champion(experiment.engine, experiment)
+    np.testing.assert_array_equal(champion.genome, genomes[best])
+    assert champion.stored_fitness == stored[best]
+    assert champion.validation_fitness == means[best]
+    assert len(set(means)) > 1
+
+
+def test_stored_fitness_does_not_choose_the_champion():
+    """A lucky draw is a candidate, and loses to who is better on fresh starts."""
+    experiment = Experiment(tiny("ga", steps=10))
+    genes = experiment.config.network.n_genes
+    # fast and straight ahead; standing still
+    fast, still = np.zeros(genes), np.zeros(genes)
+    fast[32:36], still[32:36] = 5.0, -5.0
+    experiment.optimizer.ask()
+    experiment.optimizer.tell(np.full(20, -1.0))
+    for best, genome in ((3.0, fast), (9.0, still)):
+        record = Record(len(experiment.records), 20, best, 0.0, 0.0, 0.0)
+        experiment.records.append(record)
+        experiment.best_genomes.append(genome)
+    champion = choose_champion(experiment.engine, experiment)
+    np.testing.assert_array_equal(champion.genome, fast)
+    assert champion.stored_fitness == 3.0
+
+
+# the report
+
+
+def test_held_out_against_a_slow_loop(finished):
+    experiment, _ = finished
+    starts = starts_for_test(experiment.space)[:25]
+    # drives straight on, so that some of the trials crash
+    genome = np.zeros(experiment.config.network.n_genes)
+    genome[32:36] = 5.0
+    trials = [slow_trial(experiment, genome, start) for start in starts]
+    fitness = [trial[0] for trial in trials]
+    report = held_out(experiment.engine, experiment.config.network, genome, starts)
+    assert report.mean == np.mean(fitness)
+    assert report.mean == pytest.approx(statistics.mean(fitness), rel=1e-12)
+    assert report.standard_error == pytest.approx(
+        statistics.stdev(fitness) / math.sqrt(25), rel=1e-12
+    )
+    assert report.crash_rate == sum(crashed for _, crashed in trials) / 25
+    assert report.starts == 25
+    assert 0 < report.crash_rate < 1
+    assert report.standard_error > 0
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Results of a run, without the pictures."""
+    directory = RunDirectory(tmp_path_factory.mktemp("run"))
+    experiment = Experiment(tiny("de-best", steps=20), threads=1)
+    list(experiment.run())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(results, "_draw_fitness", lambda *_: None)
+        patch.setattr(results, "_show", lambda *_: None)
+        write_results(experiment, reported_scenes(experiment), directory, threads=1)
+    return experiment, directory
+
+
+def test_the_champion_file_loads_and_acts_bit_for_bit(written):
+    experiment, directory = written
+    champion = choose_champion(experiment.engine, experiment)
+    stored = controller.load(directory.champion)
+    assert stored.genome.tobytes() == champion.genome.tobytes()
+    assert stored.network == experiment.config.network
+    observation = np.random.default_rng(3).random((100, 8))
+    own = experiment.config.network.decode(champion.genome)
+    assert stored.controller(observation).tobytes() == own(observation).tobytes()
+    # alone as in a crowd
+    alone = [stored.controller(row) for row in observation]
+    assert np.array(alone).tobytes() == own(observation).tobytes()
+
+
+def test_the_champion_file_holds_every_score(written):
+    experiment, directory = written
+    champion = choose_champion(experiment.engine, experiment)
+    stored = controller.load(directory.champion)
+    wheeled = Experiment(experiment.config.model_copy(update={"robot": "epuck"}))
+    reports = {
+        robot: held_out(
+            each.engine,
+            each.config.network,
+            champion.genome,
+            starts_for_test(each.space),
+        )
+        for robot, each in (("epuck_planar", experiment), ("epuck", wheeled))
+    }
+    assert stored.scores == {
+        "stored": champion.stored_fitness,
+        "validation": champion.validation_fitness,
+        "held_out": {robot: vars(report) for robot, report in reports.items()},
+    }
+    assert stored.task["steps"] == 20
+    assert stored.scene == {
+        "robot": "epuck_planar",
+        "arena": "arena",
+        "mjcf_sha256": dict(experiment.scene.sha256),
+    }
+
+
+def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
+    _, directory = written
+    stored = controller.load(directory.champion)
+    planar, wheeled, believed = summary(stored).splitlines()
+    scores = stored.scores["held_out"]
+    for line, robot in ((planar, "epuck_planar"), (wheeled, "epuck")):
+        mean, error = scores[robot]["mean"], scores[robot]["standard_error"]
+        crashes = scores[robot]["crash_rate"]
+        assert line == (
+            f"Held-out fitness on 200 fresh starts, {robot}: {mean:.1f} +- {error:.1f} "
+            f"of 20, {crashes:.0%} of the trials crash"
+        )
+    assert believed.startswith(f"Stored fitness {stored.scores['stored']:.1f} of 20")
+
+
+def test_a_run_on_the_wheeled_robot_is_reported_once(tmp_path, monkeypatch):
+    monkeypatch.setattr(results, "_draw_fitness", lambda *_: None)
+    monkeypatch.setattr(results, "_show", lambda *_: None)
+    experiment = Experiment(tiny("ga", robot="epuck", steps=10, evaluations=20))
+    list(experiment.run())
+    scenes = reported_scenes(experiment)
+    written = write_results(experiment, scenes, RunDirectory(tmp_path))
+    assert list(written.scores["held_out"]) == ["epuck"]
+    text = (tmp_path / "champion.json").read_text(encoding="utf-8")
+    assert text == written.to_json()
+    assert len(summary(written).splitlines()) == 2
+
+
+def test_a_champion_survives_the_checkpoint(finished, tmp_path, monkeypatch):
+    monkeypatch.setattr(champion_module, "N_VALIDATION", 12)
+    experiment, _ = finished
+    path = tmp_path / "checkpoint.npz"
+    files.write_arrays(path, experiment.state())
+    resumed = Experiment(experiment.config, threads=1)
+    resumed.restore(files.read_arrays(path))
+    left, right = candidates(experiment), candidates(resumed)
+    for a, b in zip(left, right, strict=True):
+        np.testing.assert_array_equal(a, b)
+    a, b = (choose_champion(run.engine, run) for run in (experiment, resumed))
+    assert a.genome.tobytes() == b.genome.tobytes()
+    assert (a.stored_fitness, a.validation_fitness) == (
+        b.stored_fitness,
+        b.validation_fitness,
+    )

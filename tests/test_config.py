@@ -1,0 +1,335 @@
+"""Configurations: the paper's numbers, a round trip, and what is refused."""
+
+from dataclasses import FrozenInstanceError, asdict, replace
+from pathlib import Path
+
+import pytest
+import yaml
+from pydantic import ValidationError
+
+from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
+from epuck_mj.errors import UserError
+from evolution.config import CONFIGS, ExperimentConfig, find_config, load_config
+from evolution.optimizer import OPTIMIZERS
+
+SHIPPED = ("de-best", "de-rand", "ga")
+every_experiment = pytest.mark.parametrize("name", SHIPPED)
+
+# Source: paper, section 4; what it leaves open: paper notes, section 3
+PAPER = {
+    "de-best": {
+        "algorithm": "differential_evolution",
+        "strategy": "best",
+        "population": 150,
+        "scale": 0.8,
+        "crossover": 1.0,
+        "bounds_rule": "midpoint",
+        "reevaluate_parents": False,
+    },
+    "de-rand": {
+        "algorithm": "differential_evolution",
+        "strategy": "rand",
+        "population": 120,
+        "scale": 0.7,
+        "crossover": 1.0,
+        "bounds_rule": "midpoint",
+        "reevaluate_parents": False,
+    },
+    "ga": {
+        "algorithm": "genetic_algorithm",
+        "population": 100,
+        "bits": 8,
+        "tournament": 5,
+        "crossover": 0.85,
+        "mutation": 0.01,
+        "elites": 0,
+    },
+}
+COMMON = {
+    "seed": 1,
+    "evaluations": 30_000,
+    "robot": "epuck_planar",
+    "arena": "arena",
+    "trials": 5,
+    "steps": 300,
+    "control_step": 0.1,
+    "fitness": "product",
+    "v_max": SPEED_MAX,
+    "w_max": TURN_RATE_MAX,
+    "sensor_range": 0.04,
+    "start_clearance": 0.01,
+    "hidden": 4,
+    "biases": False,
+    "weight_bound": 5.0,
+    "weight_init": 5.0,
+}
+
+
+@pytest.fixture
+def config_file(tmp_path):
+    """Writes a YAML file and gives its path."""
+
+    def write(content: str | bytes | dict) -> Path:
+        path = tmp_path / "mine.yaml"
+        if isinstance(content, dict):
+            content = yaml.safe_dump(content)
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+        return path
+
+    return write
+
+
+def refusal(path: Path) -> str:
+    """What `load_config` says of a file, which must be one line that names it."""
+    with pytest.raises(UserError) as info:
+        load_config(path)
+    message = str(info.value)
+    assert "\n" not in message
+    assert str(path) in message
+    return message
+
+
+GA = {"algorithm": "genetic_algorithm"}
+DE = {
+    "algorithm": "differential_evolution",
+    "strategy": "best",
+    "population": 10,
+    "scale": 0.5,
+    "crossover": 0.9,
+}
+
+
+def test_exactly_the_three_experiments_are_shipped():
+    assert sorted(path.stem for path in CONFIGS.iterdir()) == list(SHIPPED)
+
+
+@every_experiment
+def test_a_shipped_experiment_is_the_papers(name):
+    config = load_config(find_config(name))
+    assert config.model_dump() == {**COMMON, "optimizer": PAPER[name]}
+
+
+@every_experiment
+def test_a_shipped_experiment_is_the_optimizers_default(name):
+    assert load_config(find_config(name)).optimizer == OPTIMIZERS[name]
+
+
+def test_what_the_paper_notes_say_in_their_units():
+    config = load_config(find_config("ga"))
+    assert config.v_max == pytest.approx(0.1288, abs=5e-5)
+    assert config.w_max == pytest.approx(4.86, abs=5e-3)
+    assert config.sensor_range == PROXIMITY_RANGE == 0.04
+
+
+@every_experiment
+def test_derived_objects_hold_the_configs_values(name):
+    config = load_config(find_config(name)).model_copy(
+        update={
+            "steps": 17,
+            "control_step": 0.2,
+            "fitness": "literal",
+            "sensor_range": 0.03,
+            "v_max": 0.1,
+            "w_max": 2.0,
+            "hidden": 3,
+            "biases": True,
+            "weight_bound": 7.0,
+            "weight_init": 2.0,
+        }
+    )
+    assert asdict(config.task) == {
+        "steps": 17,
+        "control_step": 0.2,
+        "fitness": "literal",
+        "sensor_range": 0.03,
+        "speeds": {"forward": 0.1, "turn": 2.0},
+    }
+    assert asdict(config.network) == {"hidden": 3, "biases": True}
+    assert asdict(config.search_space) == {
+        # (8 sensors + bias) * 3 hidden + (3 hidden + bias) * 2 actions
+        "genes": 35,
+        "lower": -7.0,
+        "upper": 7.0,
+        "init_lower": -2.0,
+        "init_upper": 2.0,
+    }
+
+
+def test_the_papers_network_has_40_weights():
+    assert load_config(find_config("de-best")).search_space.genes == 40
+
+
+@every_experiment
+def test_yaml_round_trip(name, config_file):
+    shipped = load_config(find_config(name))
+    odd = shipped.model_copy(
+        update={
+            # values whose YAML spelling is easily read as something else
+            "seed": 2**70,
+            "robot": "null",
+            "arena": "1e3: #",
+            "control_step": 1e-5,
+            "sensor_range": 0.1 + 0.2,
+            "biases": True,
+        }
+    )
+    for config in (shipped, odd):
+        text = config.to_yaml()
+        back = load_config(config_file(text))
+        assert back == config
+        assert back.to_yaml() == text
+
+
+@every_experiment
+def test_yaml_holds_every_key_in_the_configs_order(name):
+    fields = yaml.safe_load(load_config(find_config(name)).to_yaml())
+    assert list(fields) == list(ExperimentConfig.model_fields)
+    assert set(fields["optimizer"]) == set(PAPER[name])
+
+
+def test_an_experiment_needs_no_more_than_its_optimizer(config_file):
+    config = load_config(config_file({"optimizer": GA}))
+    assert config.model_dump() == {**COMMON, "optimizer": PAPER["ga"]}
+
+
+def test_unknown_key_is_refused_with_the_available_ones(config_file):
+    message = refusal(config_file({"populaton": 3, "optimizer": GA}))
+    assert "unknown key 'populaton'" in message
+    available = message.partition("available: ")[2].split(", ")
+    assert available == list(ExperimentConfig.model_fields)
+
+
+@pytest.mark.parametrize("optimizer", [GA, DE], ids=["ga", "de"])
+def test_unknown_optimizer_key_is_refused_with_the_available_ones(
+    optimizer, config_file
+):
+    message = refusal(config_file({"optimizer": {**optimizer, "tornament": 3}}))
+    assert "unknown key 'optimizer.tornament'" in message
+    available = message.partition("available: ")[2].split(", ")
+    known = PAPER["ga"] if optimizer is GA else PAPER["de-best"]
+    assert set(available) == set(known)
+
+
+def test_a_key_of_the_other_optimizer_is_unknown(config_file):
+    message = refusal(config_file({"optimizer": {**GA, "strategy": "best"}}))
+    assert "unknown key 'optimizer.strategy'" in message
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("seed", -1),
+        ("seed", "many"),
+        ("seed", [1]),
+        ("seed", None),
+        ("evaluations", 0),
+        ("evaluations", 2.5),
+        ("robot", 3),
+        ("arena", ["arena"]),
+        ("trials", 0),
+        ("steps", "300 or so"),
+        ("control_step", 0),
+        ("control_step", float("nan")),
+        ("fitness", "sum"),
+        ("v_max", -0.1),
+        ("w_max", float("inf")),
+        ("sensor_range", {}),
+        ("hidden", 0),
+        ("biases", "maybe"),
+        ("weight_bound", 0.0),
+        ("start_clearance", "wide"),
+    ],
+)
+def test_a_wrong_value_is_refused_by_name_and_shown(key, value, config_file):
+    message = refusal(config_file({key: value, "optimizer": GA}))
+    assert f"{key}: " in message
+    assert message.endswith(f"got {value!r}")
+
+
+@pytest.mark.parametrize(
+    ("optimizer", "words"),
+    [
+        ({**GA, "bits": "x"}, ("optimizer.bits: ", "'x'")),
+        ({**GA, "population": 10.5}, ("optimizer.population: ", "10.5")),
+        ({**GA, "population": 1}, ("population: expected at least 2", "1")),
+        ({**GA, "elites": 100}, ("elites: expected 0 to population - 1", "100")),
+        ({**DE, "strategy": "bst"}, ("unknown strategy 'bst'", "best, rand")),
+        ({**DE, "bounds_rule": "wrap"}, ("unknown bounds rule", "midpoint")),
+        ({**DE, "scale": float("nan")}, ("scale (F): expected 0 to 2", "nan")),
+        ({**DE, "reevaluate_parents": "x"}, ("optimizer.reevaluate_parents: ",)),
+        ({"algorithm": "cma"}, ("differential_evolution, genetic_algorithm", "cma")),
+        ({"bits": 8}, ("differential_evolution, genetic_algorithm",)),
+        ("ga", ("differential_evolution, genetic_algorithm", "'ga'")),
+        ({"algorithm": "differential_evolution"}, ("'optimizer.strategy' is missing",)),
+    ],
+)
+def test_a_wrong_optimizer_is_refused(optimizer, words, config_file):
+    message = refusal(config_file({"optimizer": optimizer}))
+    for word in words:
+        assert word in message
+
+
+def test_everything_wrong_is_named_at_once(config_file):
+    message = refusal(
+        config_file({"trials": 0, "stpes": 3, "optimizer": {**GA, "bits": "x"}})
+    )
+    for word in ("trials: ", "unknown key 'stpes'", "optimizer.bits: "):
+        assert word in message
+
+
+def test_missing_optimizer_is_refused(config_file):
+    assert "key 'optimizer' is missing" in refusal(config_file({"seed": 3}))
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("seed: [1\n", "is not YAML"),
+        ("seed: 1\n\tsteps: 2\n", "is not YAML"),
+        ("!!python/object/apply:os.getcwd []\n", "is not YAML"),
+        (b"\xff\xfe\x00", "cannot read"),
+        ("", "expected a mapping of keys to values, got NoneType"),
+        ("- seed\n", "expected a mapping of keys to values, got list"),
+        ("just words\n", "expected a mapping of keys to values, got str"),
+    ],
+)
+def test_what_is_no_mapping_is_refused(content, words, config_file):
+    assert words in refusal(config_file(content))
+
+
+@pytest.mark.parametrize("value", ["2026-99-99", "1" * 5000], ids=["date", "digits"])
+def test_a_scalar_that_yaml_cannot_construct_is_refused(value, config_file):
+    assert "is not YAML" in refusal(config_file(f"seed: {value}\n"))
+
+
+def test_a_file_that_cannot_be_read_is_refused(tmp_path):
+    refusal(tmp_path / "missing.yaml")
+    refusal(tmp_path)
+
+
+def test_unknown_experiment_is_refused_with_the_shipped_ones(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match=r"no experiment 'de'.*de-best, de-rand, ga$"):
+        find_config("de")
+    with pytest.raises(UserError, match="no experiment"):
+        find_config(".")
+
+
+def test_an_own_file_is_found_by_its_path(config_file):
+    path = config_file({"optimizer": GA})
+    assert find_config(str(path)) == path
+
+
+@every_experiment
+def test_frozen(name):
+    config = load_config(find_config(name))
+    with pytest.raises(ValidationError, match="frozen"):
+        config.seed = 3  # pyright: ignore[reportAttributeAccessIssue]
+    with pytest.raises(FrozenInstanceError):
+        config.optimizer.population = 3  # pyright: ignore[reportAttributeAccessIssue]
+    # what a changed copy is made with leaves the original alone
+    changed = config.model_copy(
+        update={"optimizer": replace(config.optimizer, population=9)}
+    )
+    assert changed.optimizer.population == 9
+    assert config.optimizer.population == PAPER[name]["population"]

@@ -1,0 +1,919 @@
+"""`python -m evolution.run`: what it leaves behind, and that nothing can break it."""
+
+import errno
+import hashlib
+import json
+import os
+import random
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from matplotlib.image import imread
+from rerun.chunk import RrdReader
+
+from epuck_mj import controller, files
+from epuck_mj.errors import UserError
+from epuck_mj.model import MODELS
+from epuck_mj.trajectory import Trajectory
+from evolution import champion, results
+from evolution.config import CONFIGS, find_config, load_config
+from evolution.experiment import HISTORY_HEADER
+from evolution.run import run
+
+TIMEOUT = 120
+"""Seconds for what takes a few on a machine that does nothing else."""
+
+SMALL = ["--steps", "20", "--trials", "2", "--population", "10"]
+SHORT = [*SMALL, "--evaluations", "20"]
+TINY = [*SMALL, "--evaluations", "60"]
+LONG = [*SMALL, "--evaluations", "400"]
+LONG_GENERATIONS = 40
+
+PROMISED = {
+    "config.yaml",
+    "provenance.json",
+    "history.csv",
+    "timing.csv",
+    "checkpoint.npz",
+    "champion.json",
+    "fitness.png",
+    "trajectory.npz",
+    "trajectory.png",
+    "champion.rrd",
+}
+REPRODUCED = ("history.csv", "champion.json")
+
+
+# processes
+
+
+@contextmanager
+def started(cwd: Path, *command: str, **variables) -> Iterator[subprocess.Popen[str]]:
+    """A python process, which does not outlive the block."""
+    process = subprocess.Popen(
+        [sys.executable, *command],
+        cwd=cwd,
+        env=os.environ | variables,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def evolution(cwd: Path, *argv: str, **variables) -> subprocess.CompletedProcess[str]:
+    """The finished process of a command line."""
+    with started(cwd, "-m", "evolution.run", *argv, **variables) as process:
+        stdout, stderr = process.communicate(timeout=TIMEOUT)
+    return subprocess.CompletedProcess(argv, process.returncode, stdout, stderr)
+
+
+def wait_for(process: subprocess.Popen, moment: Callable[[], bool]) -> None:
+    """Wait until then, or until the process has ended."""
+    deadline = time.monotonic() + TIMEOUT
+    while not moment() and process.poll() is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def n_records(directory: Path) -> int:
+    """Generations in the checkpoint, which can be read at any moment."""
+    if not (directory / "checkpoint.npz").exists():
+        return 0
+    return len(files.read_arrays(directory / "checkpoint.npz")["records"])
+
+
+def n_rows(directory: Path) -> int:
+    """Generations in history.csv."""
+    if not (directory / "history.csv").exists():
+        return 0
+    header, *rows = (directory / "history.csv").read_text().splitlines()
+    assert header == HISTORY_HEADER
+    return len(rows)
+
+
+def assert_reproduced(directory: Path, reference: Path) -> None:
+    for name in REPRODUCED:
+        assert (directory / name).read_bytes() == (reference / name).read_bytes(), name
+
+
+# in this process
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty directory that is the working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def no_pictures(monkeypatch):
+    """Nothing is drawn."""
+    monkeypatch.setattr(results, "_draw_fitness", lambda *_: None)
+    monkeypatch.setattr(results, "_show", lambda *_: None)
+
+
+@pytest.fixture
+def quick(no_pictures, monkeypatch):
+    """Few starts are held out too: for runs by the dozen."""
+    monkeypatch.setattr(champion, "N_VALIDATION", 5)
+    monkeypatch.setattr(champion, "N_TEST", 5)
+
+
+def tree(directory: Path) -> dict[str, str]:
+    """Everything below a directory, with a hash of the content of files."""
+    return {
+        str(path.relative_to(directory)): hashlib.sha256(path.read_bytes()).hexdigest()
+        if path.is_file()
+        else "directory"
+        for path in sorted(directory.rglob("*"))
+    }
+
+
+@pytest.fixture
+def refusal(here, capfd):
+    """Runs a command line that must be refused, and gives the message."""
+
+    def refused(*argv: str) -> str:
+        before = tree(here)
+        with pytest.raises(UserError) as info:
+            run(argv)
+        message = str(info.value)
+        assert message.strip()
+        assert "\n" not in message
+        # nothing left behind, nothing changed, nothing else said
+        assert tree(here) == before
+        assert capfd.readouterr() == ("", "")
+        return message
+
+    return refused
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A finished run, as a process of its own: where it is and what it said."""
+    cwd = tmp_path_factory.mktemp("finished")
+    process = evolution(cwd, "ga", "--seed", "7", *TINY, "--output", "run")
+    assert process.returncode == 0, process.stderr
+    return cwd / "run", process
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    """A longer run that nothing interrupted."""
+    directory = tmp_path_factory.mktemp("reference") / "run"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(results, "_show", lambda *_: None)
+        assert run(["ga", "--seed", "7", *LONG, "--output", str(directory)]) == 0
+    return directory
+
+
+@pytest.fixture
+def unfinished(finished, here):
+    """A copy of the finished run in which the champion is still to be chosen."""
+    directory = here / "run"
+    shutil.copytree(finished[0], directory)
+    for name in ("champion.json", "fitness.png", "champion.rrd"):
+        (directory / name).unlink()
+    provenance = json.loads((directory / "provenance.json").read_text())
+    (directory / "provenance.json").write_text(
+        json.dumps({**provenance, "finished": None})
+    )
+    return directory
+
+
+# what a run leaves behind
+
+
+def test_all_promised_files_are_there_and_nothing_else(finished):
+    directory, _ = finished
+    assert {path.name for path in directory.iterdir()} == PROMISED
+
+
+def test_history(finished):
+    directory, _ = finished
+    header, *rows = (directory / "history.csv").read_text().splitlines()
+    assert header == "generation,evaluations,best,mean,std,crash_rate"
+    assert [row.split(",")[:2] for row in rows] == [
+        [str(i), str(10 * (i + 1))] for i in range(6)
+    ]
+
+
+def test_timing(finished):
+    directory, _ = finished
+    header, *rows = (directory / "timing.csv").read_text().splitlines()
+    assert header == "generation,seconds"
+    assert [row.split(",")[0] for row in rows] == [str(i) for i in range(6)]
+    assert all(float(row.split(",")[1]) >= 0 for row in rows)
+
+
+def test_the_stored_config_is_the_resolved_one(finished):
+    directory, _ = finished
+    shipped = load_config(find_config("ga")).model_dump()
+    shipped |= {"seed": 7, "steps": 20, "evaluations": 60, "trials": 2}
+    shipped["optimizer"]["population"] = 10
+    assert load_config(directory / "config.yaml").model_dump() == shipped
+
+
+def test_provenance(finished):
+    directory, _ = finished
+    provenance = json.loads((directory / "provenance.json").read_text())
+    assert provenance["argv"] == ["ga", "--seed", "7", *TINY, "--output", "run"]
+    assert (provenance["engine"], provenance["threads"]) == ("batch", 0)
+    for package in ("python", "mujoco", "dm-control", "numpy", "scipy", "rerun-sdk"):
+        assert re.match(r"\d+\.\d+", provenance["versions"][package])
+    assert set(provenance["mjcf_sha256"]) == {"arena", "robot"}
+    assert all(
+        re.fullmatch("[0-9a-f]{64}", h) for h in provenance["mjcf_sha256"].values()
+    )
+    assert provenance["processor"]["machine"]
+    if sys.platform == "linux":
+        assert provenance["processor"]["flags"]
+    if provenance["git"] is not None:
+        assert re.fullmatch("[0-9a-f]{40}", provenance["git"]["commit"])
+        assert isinstance(provenance["git"]["modified"], bool)
+    assert provenance["started"] <= provenance["finished"]
+    assert "resumed" not in provenance
+
+
+def test_the_checkpoint_holds_every_generation(finished):
+    directory, _ = finished
+    with np.load(directory / "checkpoint.npz", allow_pickle=False) as file:
+        assert file["records"].shape == (6, 6)
+        assert file["best_genomes"].shape == (6, 40)
+        assert file["optimizer.fitness"].shape == (10,)
+
+
+def test_the_champions_file_pictures_and_recordings_can_be_read(finished):
+    directory, _ = finished
+    stored = controller.load(directory / "champion.json")
+    assert stored.genome.shape == (40,)
+    assert set(stored.scores["held_out"]) == {"epuck_planar", "epuck"}
+    assert 1 <= Trajectory.load(directory / "trajectory.npz").steps <= 20
+    for name in ("fitness.png", "trajectory.png"):
+        picture = imread(directory / name)
+        assert min(picture.shape[:2]) > 300
+        assert picture[..., :3].std() > 0.01
+    assert len(list(RrdReader(directory / "champion.rrd").stream())) > 0
+
+
+def test_the_summary_is_in_plain_words(finished):
+    directory, process = finished
+    scores = controller.load(directory / "champion.json").scores
+    first, planar, wheeled, stored, written, replay = process.stdout.splitlines()
+    assert re.fullmatch(
+        r"ga, seed 7: 60 evaluations in 6 generations, \d+ min \d+ s", first
+    )
+    for line, robot in ((planar, "epuck_planar"), (wheeled, "epuck")):
+        report = scores["held_out"][robot]
+        assert f"Held-out fitness on 200 fresh starts, {robot}: " in line
+        assert f" {report['mean']:.1f} +- {report['standard_error']:.1f} of 20" in line
+        assert f" {report['crash_rate']:.0%} of the trials crash" in line
+    assert stored.startswith(f"Stored fitness {scores['stored']:.1f} of 20")
+    assert written == f"Written to run: {', '.join(sorted(PROMISED))}"
+    assert replay.startswith("Replay: ")
+    assert replay.endswith(" -m rerun run/champion.rrd")
+
+
+def test_progress_is_on_stderr_one_line_for_a_generation(finished):
+    _, process = finished
+    lines = process.stderr.splitlines()
+    assert len(lines) == 6
+    for i, line in enumerate(lines):
+        pattern = rf" *{10 * (i + 1)} of 60 evaluations: gen={i} best=.* crash=\d+%"
+        assert re.fullmatch(pattern, line)
+
+
+# the forms of the command line
+
+
+def test_own_yaml_default_output_and_the_same_seed_twice(finished, tmp_path):
+    """`my.yaml --threads 1`: a file in place of the flags, another process."""
+    config = load_config(find_config("ga")).model_dump()
+    config |= {"seed": 7, "steps": 20, "evaluations": 60, "trials": 2}
+    config["optimizer"]["population"] = 10
+    (tmp_path / "my.yaml").write_text(yaml.safe_dump(config))
+    process = evolution(tmp_path, "my.yaml", "--threads", "1")
+    assert process.returncode == 0, process.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["my.yaml", "runs"]
+    directory = tmp_path / "runs" / "my-seed-7"
+    assert {path.name for path in directory.iterdir()} == PROMISED
+    assert_reproduced(directory, finished[0])
+    # pictures and recordings of the same run are the same too
+    for name in ("config.yaml", "fitness.png", "trajectory.png", "trajectory.npz"):
+        assert (directory / name).read_bytes() == (finished[0] / name).read_bytes()
+
+
+def test_default_output_is_named_by_experiment_and_seed(here, quick):
+    assert run(["de-rand", "--seed", "3", *SHORT]) == 0
+    assert run(SHORT) == 0
+    names = sorted(path.name for path in (here / "runs").iterdir())
+    assert names == ["de-best-seed-1", "de-rand-seed-3"]
+
+
+def test_print_config_writes_nothing_and_loads_back(tmp_path):
+    process = evolution(tmp_path, "ga", "--seed", "7", *TINY, "--print-config")
+    assert (process.returncode, process.stderr) == (0, "")
+    assert not any(tmp_path.iterdir())
+    (tmp_path / "back.yaml").write_text(process.stdout)
+    config = load_config(tmp_path / "back.yaml")
+    assert (config.seed, config.steps, config.optimizer.population) == (7, 20, 10)
+    assert config.to_yaml() == process.stdout
+
+
+@pytest.mark.parametrize("name", ["de-best", "de-rand", "ga"])
+def test_print_config_of_a_shipped_experiment(name, here, capsys):
+    assert run([name, "--print-config"]) == 0
+    assert capsys.readouterr().out == load_config(find_config(name)).to_yaml()
+    # a printed config is an experiment: the same again
+    (here / "mine.yaml").write_text(load_config(find_config(name)).to_yaml())
+    assert run(["mine.yaml", "--print-config"]) == 0
+    assert capsys.readouterr().out == load_config(find_config(name)).to_yaml()
+
+
+def test_a_flag_wins_over_the_yaml(here, capsys):
+    text = (CONFIGS / "ga.yaml").read_text() + "seed: 5\nbiases: false\n"
+    (here / "mine.yaml").write_text(text)
+    flags = "--seed 6 --biases --control-step 0.2 --mutation 0.5 --robot epuck"
+    assert run(["mine.yaml", *flags.split(), "--print-config"]) == 0
+    printed = yaml.safe_load(capsys.readouterr().out)
+    assert (printed["seed"], printed["biases"]) == (6, True)
+    assert (printed["control_step"], printed["robot"]) == (0.2, "epuck")
+    assert printed["optimizer"]["mutation"] == 0.5
+    assert printed["trials"] == 5
+
+
+def test_help_ends_well(capsys):
+    with pytest.raises(SystemExit) as info:
+        run(["ga", "--help"])
+    assert not info.value.code
+    assert "--tournament" in capsys.readouterr().out
+
+
+def test_resume_of_a_finished_run_changes_nothing(finished, here, capsys):
+    before = tree(finished[0])
+    assert run(["--resume", str(finished[0])]) == 0
+    assert "is finished; Replay: " in capsys.readouterr().out
+    assert tree(finished[0]) == before
+
+
+def test_a_run_on_an_own_robot_of_another_name(here, quick, capsys):
+    shutil.copy(MODELS / "epuck_planar.xml", here / "mine.xml")
+    (here / "out").mkdir()
+    # an empty directory is as good as none
+    assert run(["ga", *SHORT, "--robot", "mine.xml", "--output", "out"]) == 0
+    out = capsys.readouterr().out
+    assert "fresh starts, mine.xml: " in out
+    assert "fresh starts, epuck: " in out
+    scene = controller.load("out/champion.json").scene
+    assert scene["robot"] == str(here / "mine.xml")
+    assert set(scene["mjcf_sha256"]) == {"arena", "robot"}
+    # the same robot by its name is the same run
+    assert run(["ga", *SHORT, "--output", "named"]) == 0
+    history = (here / "named" / "history.csv").read_bytes()
+    assert (here / "out" / "history.csv").read_bytes() == history
+
+
+def test_the_wheeled_robot_is_reported_once(here, quick, capsys):
+    assert run(["ga", *SHORT, "--robot", "epuck", "--output", "out"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("Held-out fitness") == 1
+    assert list(controller.load("out/champion.json").scores["held_out"]) == ["epuck"]
+
+
+def test_the_engine_changes_nothing(here, quick):
+    for engine in ("batch", "dm_control"):
+        assert run(["ga", *SHORT, "--engine", engine, "--output", engine]) == 0
+    assert_reproduced(here / "dm_control", here / "batch")
+
+
+# bad input
+
+
+WALLS = (
+    ("0.01 0.52 0.03", "0.51 0 0.03"),
+    ("0.01 0.52 0.03", "-0.51 0 0.03"),
+    ("0.5 0.01 0.03", "0 0.51 0.03"),
+    ("0.5 0.01 0.03", "0 -0.51 0.03"),
+)
+
+
+def arena(timestep: float = 0.01, walls=WALLS) -> str:
+    geoms = "".join(f'<geom type="box" size="{s}" pos="{p}"/>' for s, p in walls)
+    floor = '<geom type="plane" size="1 1 1" contype="2" conaffinity="2"/>'
+    option = f'<option timestep="{timestep}" integrator="implicitfast"/>'
+    return f"<mujoco>{option}<worldbody>{floor}{geoms}</worldbody></mujoco>"
+
+
+GA = "optimizer: {algorithm: genetic_algorithm}\n"
+FULL = (MODELS / "epuck_planar.xml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("populaton: 3\n" + GA, ("unknown key 'populaton'", "available: seed, ")),
+        ("optimizer: {algorithm: genetic_algorithm, bit: 3}", ("'optimizer.bit'",)),
+        ("trials: many\n" + GA, ("trials: ", "'many'")),
+        ("seed: 1\n", ("'optimizer' is missing",)),
+        ("seed: [1\n", ("is not YAML",)),
+        ("- 1\n", ("expected a mapping",)),
+        ("evaluations: 99\n" + GA, ("at least one generation, 100", "got 99")),
+        ("weight_init: 1.0\n" + GA, ("initial range",)),
+    ],
+)
+def test_a_bad_experiment_file_is_refused(content, words, refusal, here):
+    (here / "mine.yaml").write_text(content)
+    message = refusal("mine.yaml", "--output", "out")
+    for word in words:
+        assert word in message
+
+
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        (["nope"], ("no experiment 'nope'", "de-best, de-rand, ga")),
+        (["missing.yaml"], ("no experiment 'missing.yaml'",)),
+        (["ga", "--populaton", "3"], ("--populaton",)),
+        (["ga", "--strategy", "best"], ("--strategy",)),
+        (["ga", "de-best"], ("de-best",)),
+        (["--seed", "3", "ga"], ("experiment comes first", "evolution.run ga")),
+        (["ga", "--seed", "x"], ("--seed", "'x'")),
+        (["ga", "--seed", "-1"], ("seed", "-1")),
+        (["ga", "--seed"], ("--seed",)),
+        (["ga", "--steps", "0"], ("steps", "0")),
+        (["ga", "--v-max", "nan"], ("v_max", "nan")),
+        (["ga", "--fitness", "sum"], ("'sum'", "product", "literal")),
+        (["ga", "--engine", "stage"], ("'stage'", "batch", "dm_control")),
+        (["ga", "--elites", "200"], ("elites: expected 0 to population - 1",)),
+        (["de-best", "--strategy", "bst"], ("unknown strategy 'bst'",)),
+        (["ga", "--threads", "-1"], ("threads from 0 to 1024, got -1",)),
+        (["ga", "--threads", "two"], ("--threads", "'two'")),
+        (["ga", "--evaluations", "99"], ("one generation, 100", "got 99")),
+        (["ga", "--control-step", "0.03"], ("multiple", "0.02 s", "0.03 s")),
+        (["ga", "--control-step", "0.001"], ("multiple", "0.02 s", "0.001 s")),
+        (["ga", "--start-clearance", "0.6"], ("no room for a start",)),
+        (["ga", "--robot", "nope"], ("no robot 'nope'", "epuck, epuck_planar")),
+        (["ga", "--arena", "nope"], ("no arena 'nope'", "arena")),
+        (["--resume"], ("--resume",)),
+        (["--resume", "nowhere"], ("nothing to resume", "nowhere/config.yaml")),
+        (["--resume", "a", "--output", "b", "ga"], ("nothing to resume",)),
+    ],
+)
+def test_bad_arguments_are_refused(argv, words, refusal):
+    message = refusal(*argv)
+    for word in words:
+        assert word in message
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("<mujoco>\n<worldbody>\n</mujoco>", ("not well-formed XML", "line 3")),
+        ("", ("not well-formed XML",)),
+        ("<mujoco><worldbdy/></mujoco>", ("MuJoCo cannot compile", "worldbdy")),
+        (arena(walls=()), ("has no walls",)),
+        (arena(walls=WALLS[:3]), ("no room for a start",)),
+        (arena().replace("0.51", "0.05"), ("no room for a start",)),
+        (arena(timestep=0), ("mine.xml", "physics step")),
+    ],
+)
+def test_a_bad_arena_is_refused(text, words, refusal, here):
+    (here / "mine.xml").write_text(text)
+    message = refusal("ga", *TINY, "--arena", "mine.xml", "--output", "out")
+    for word in ("mine.xml", *words):
+        assert word in message
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            lambda text: re.sub('<rangefinder name="ps3".*?/>', "", text),
+            ("no sensor 'ps3'", "available: ps0, ps1, ps2, ps4"),
+        ),
+        (
+            lambda text: text.replace('name="wheel_left"', 'name="left"'),
+            ("no actuator 'wheel_left'", "available: left, wheel_right"),
+        ),
+        (
+            lambda text: text.replace('name="epuck"', 'name="robot"'),
+            ("no body 'epuck'",),
+        ),
+        (lambda text: text.replace('type="hinge"', 'type="ball"'), ("mine.xml",)),
+        (lambda text: text[: len(text) // 2], ("mine.xml",)),
+        (lambda text: text.replace("site=", "place=", 1), ("mine.xml",)),
+    ],
+)
+def test_a_bad_robot_is_refused(change, words, refusal, here):
+    text = change(FULL)
+    assert text != FULL
+    (here / "mine.xml").write_text(text)
+    message = refusal("ga", *TINY, "--robot", "mine.xml", "--output", "out")
+    for word in words:
+        assert word in message
+
+
+def test_an_output_that_is_used_is_refused(refusal, here):
+    (here / "out").mkdir()
+    (here / "out" / "thesis.tex").write_text("years of work")
+    (here / "file").write_text("")
+    message = refusal("ga", *TINY, "--output", "out")
+    assert "'out' is not empty" in message
+    assert "--resume out" in message
+    assert "not a directory" in refusal("ga", *TINY, "--output", "file")
+    assert "cannot write" in refusal("ga", *TINY, "--output", "file/deeper/run")
+
+
+def test_a_changed_config_is_refused_on_resume(refusal, unfinished):
+    message = refusal("--resume", "run", "--seed", "8", "--mutation", "0.5")
+    keys = re.findall(r"[\w.]+(?= \(stored)", message)
+    assert keys == ["seed", "optimizer.mutation"]
+    assert "seed (stored 7, got 8)" in message
+    message = refusal("de-best", *TINY, "--seed", "7", "--resume", "run")
+    assert "optimizer.algorithm (stored genetic_algorithm" in message
+    assert "optimizer.strategy (stored None, got best)" in message
+
+
+def test_resume_and_output_together_are_refused(refusal, unfinished):
+    message = refusal("--resume", "run", "--output", "other")
+    assert message == "expected --resume or --output, got both"
+
+
+def test_the_same_config_by_its_flags_can_be_resumed(unfinished, finished, quick):
+    assert run(["ga", "--seed", "7", *TINY, "--resume", "run"]) == 0
+    history = (unfinished / "history.csv").read_bytes()
+    assert history == (finished[0] / "history.csv").read_bytes()
+
+
+@pytest.mark.parametrize("size", [0, 100, 4000, -1])
+def test_a_truncated_checkpoint_is_refused_and_kept(size, refusal, unfinished):
+    path = unfinished / "checkpoint.npz"
+    path.write_bytes(path.read_bytes()[:size])
+    # `refusal` sees that the file stays as it was
+    assert "run/checkpoint.npz" in refusal("--resume", "run")
+
+
+@pytest.mark.parametrize("content", [b"PK", b"\x93NUMPY"])
+def test_a_checkpoint_that_is_none_is_refused(content, refusal, unfinished):
+    (unfinished / "checkpoint.npz").write_bytes(content)
+    assert "run/checkpoint.npz" in refusal("--resume", "run")
+
+
+def test_a_checkpoint_of_another_algorithm_or_size_is_refused(
+    refusal, unfinished, here, quick, capfd
+):
+    path = unfinished / "checkpoint.npz"
+    for argv in (["de-best", *SHORT], ["ga", *SHORT, "--population", "12"]):
+        other = f"other-{len(argv)}"
+        assert run([*argv, "--output", other]) == 0
+        capfd.readouterr()
+        shutil.copy(here / other / "checkpoint.npz", path)
+        assert "not a checkpoint of this run" in refusal("--resume", "run")
+
+
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        (["ga", "--populaton", "3", "--output", "out"], "--populaton"),
+        (["mine.yaml", "--output", "out"], "unknown key 'populaton'"),
+        (["ga", *TINY, "--arena", "broken.xml", "--output", "out"], "broken.xml"),
+        (["--resume", "run"], "run/checkpoint.npz"),
+    ],
+)
+def test_bad_input_ends_a_process_with_one_line_and_status_2(argv, words, unfinished):
+    here = unfinished.parent
+    (here / "mine.yaml").write_text("populaton: 3\n" + GA)
+    (here / "broken.xml").write_text("<mujoco>")
+    checkpoint = unfinished / "checkpoint.npz"
+    checkpoint.write_bytes(checkpoint.read_bytes()[:-100])
+    before = tree(here)
+    process = evolution(here, *argv)
+    assert (process.returncode, process.stdout) == (2, "")
+    assert process.stderr.startswith("error: ")
+    assert process.stderr.count("\n") == 1
+    assert process.stderr.endswith("\n")
+    assert words in process.stderr
+    assert tree(here) == before
+
+
+# interrupted
+
+
+def resume_command(stderr: str) -> list[str]:
+    """The arguments that the last line tells a person to type."""
+    line = stderr.splitlines()[-1]
+    match = re.fullmatch(
+        r"Interrupted after ([\d,]+) evaluations; go on with: (.*)", line
+    )
+    assert match, stderr
+    python, dash_m, module, *argv = shlex.split(match[2])
+    assert Path(python).name.startswith("python")
+    assert (dash_m, module) == ("-m", "evolution.run")
+    return argv
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("signum", "status", "generations"),
+    [
+        (signal.SIGINT, 130, 3),
+        (signal.SIGTERM, 143, 1),
+        # all are there: the champion is being chosen
+        (signal.SIGINT, 130, LONG_GENERATIONS),
+    ],
+    ids=["SIGINT", "SIGTERM", "SIGINT-champion"],
+)
+def test_a_signal_ends_the_run_and_says_how_to_resume(
+    signum, status, generations, reference, tmp_path, no_pictures, monkeypatch
+):
+    argv = ["ga", "--seed", "7", *LONG, "--output", "some where"]
+    directory = tmp_path / "some where"
+    with started(tmp_path, "-m", "evolution.run", *argv) as process:
+        wait_for(process, lambda: n_rows(directory) >= generations)
+        process.send_signal(signum)
+        stdout, stderr = process.communicate(timeout=TIMEOUT)
+    assert process.returncode == status, stderr
+    assert stdout == ""
+    assert "Traceback" not in stderr
+    assert "Exception ignored" not in stderr
+    assert generations <= n_rows(directory) <= n_records(directory)
+    assert json.loads((directory / "provenance.json").read_text())["finished"] is None
+    assert not (directory / "champion.rrd").exists()
+    # no half-written file
+    assert not [path for path in directory.iterdir() if path.name.startswith(".")]
+    monkeypatch.chdir(tmp_path)
+    assert run(resume_command(stderr)) == 0
+    assert_reproduced(directory, reference)
+    provenance = json.loads((directory / "provenance.json").read_text())
+    assert provenance["argv"] == argv
+    assert [each["argv"] for each in provenance["resumed"]] == [
+        ["--resume", "some where"]
+    ]
+    assert provenance["finished"]
+
+
+@pytest.mark.slow
+def test_kill_9_at_any_moment_loses_at_most_one_generation(reference, tmp_path):
+    directory, done = tmp_path / "run", 0
+    argv = ["ga", "--seed", "7", *LONG, "--output", "run"]
+    moments = [
+        lambda: (directory / "config.yaml").exists(),
+        lambda: n_records(directory) > done,
+        lambda: n_records(directory) > done,
+        lambda: n_records(directory) == LONG_GENERATIONS,
+    ]
+    for moment in moments:
+        with started(tmp_path, "-m", "evolution.run", *argv) as process:
+            wait_for(process, moment)
+            time.sleep(random.uniform(0, 0.2))
+            process.kill()
+            _, stderr = process.communicate(timeout=TIMEOUT)
+        assert process.returncode in (-signal.SIGKILL, 0), stderr
+        records = n_records(directory)
+        announced = [int(each) for each in re.findall(r"gen=(\d+)", stderr)]
+        # what was there and what was said to be done is there; goes on, not again
+        assert records >= max([done, *(each + 1 for each in announced)])
+        assert announced[:1] in ([], [done])
+        assert records - 1 <= n_rows(directory) <= records
+        done, argv = records, ["--resume", "run"]
+    process = evolution(tmp_path, *argv)
+    assert process.returncode == 0, process.stderr
+    assert_reproduced(directory, reference)
+    assert n_records(directory) == LONG_GENERATIONS
+    assert {path.name for path in directory.iterdir()} >= PROMISED
+    timed = (directory / "timing.csv").read_text().split()[1:]
+    generations = [int(row.split(",")[0]) for row in timed]
+    assert generations == sorted(set(generations))
+    resumed = json.loads((directory / "provenance.json").read_text())["resumed"]
+    assert 1 <= len(resumed) <= len(moments)
+
+
+@pytest.mark.slow
+def test_resume_from_between_any_two_writes(here, quick, monkeypatch):
+    """What a kill would leave before and after each file, one after the other."""
+    moments, write = [], files.write_bytes
+
+    def watched(path: Path, content: bytes) -> None:
+        write(path, content)
+        moments.append((path.name, f"{len(moments)}"))
+        shutil.copytree("whole", moments[-1][1])
+
+    with monkeypatch.context() as patch:
+        patch.setattr(files, "write_bytes", watched)
+        assert run(["ga", *SHORT, "--output", "whole"]) == 0
+    assert [name for name, _ in moments] == [
+        "config.yaml",
+        "provenance.json",
+        *["checkpoint.npz", "history.csv"] * 2,
+        "champion.json",
+        "provenance.json",
+    ]
+    for _, moment in moments:
+        assert run(["--resume", moment]) == 0
+        assert_reproduced(here / moment, here / "whole")
+        assert n_records(here / moment) == 2
+
+
+def test_a_full_disk_leaves_what_was_there(here, quick, monkeypatch):
+    argv = ["ga", *TINY, "--output"]
+    assert run([*argv, "whole"]) == 0
+    sync, calls = os.fsync, []
+
+    def full(handle: int) -> None:
+        calls.append(handle)
+        # config, provenance, checkpoint, history, and then another checkpoint
+        if len(calls) == 5:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        sync(handle)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(UserError, match=r"No space left .* --resume run$"):
+            run([*argv, "run"])
+    names = {"config.yaml", "provenance.json", "checkpoint.npz", "history.csv"}
+    assert {path.name for path in (here / "run").iterdir()} == names | {"timing.csv"}
+    assert (n_records(here / "run"), n_rows(here / "run")) == (1, 1)
+    assert run(["--resume", "run"]) == 0
+    assert_reproduced(here / "run", here / "whole")
+
+
+def test_a_run_that_has_only_its_config_can_be_resumed(here, quick):
+    argv = ["ga", *SHORT]
+    assert run([*argv, "--output", "whole"]) == 0
+    (here / "begun").mkdir()
+    shutil.copy("whole/config.yaml", "begun")
+    assert run(["--resume", "begun"]) == 0
+    assert_reproduced(here / "begun", here / "whole")
+    provenance = json.loads((here / "begun" / "provenance.json").read_text())
+    assert provenance["finished"]
+
+
+def test_resume_from_another_directory(unfinished, finished, quick, monkeypatch):
+    elsewhere = unfinished.parent / "else" / "where"
+    elsewhere.mkdir(parents=True)
+    monkeypatch.chdir(elsewhere)
+    assert run(["--resume", "../../run"]) == 0
+    assert not any(elsewhere.iterdir())
+    assert json.loads((unfinished / "provenance.json").read_text())["finished"]
+    history = (unfinished / "history.csv").read_bytes()
+    assert history == (finished[0] / "history.csv").read_bytes()
+
+
+TWICE = """
+import signal, sys
+from epuck_mj.command_line import main
+from evolution import run
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+class Progress(run.Progress):
+    def update(self, record):
+        signal.raise_signal(signal.SIGINT)
+
+    def __exit__(self, *exception):
+        super().__exit__(*exception)
+        if MOMENT == "unwinding":
+            signal.raise_signal(signal.SIGINT)
+
+def late(argv):
+    status = run.run(argv)
+    if MOMENT == "leaving":
+        signal.raise_signal(signal.SIGINT)
+    return status
+
+run.Progress = Progress
+main(late)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "moment",
+    [
+        "unwinding",
+        "leaving",
+    ],
+)
+def test_a_second_ctrl_c_changes_nothing(moment, tmp_path):
+    code = TWICE.replace("MOMENT", repr(moment))
+    argv = ["ga", *TINY, "--output", "run"]
+    with started(tmp_path, "-c", code, *argv) as process:
+        _, stderr = process.communicate(timeout=TIMEOUT)
+    assert process.returncode == 130
+    assert resume_command(stderr) == ["--resume", "run"]
+    assert "Traceback" not in stderr
+    assert n_records(tmp_path / "run") == 1
+
+
+def test_a_terminal_without_unicode_gets_the_message_too(tmp_path):
+    process = evolution(tmp_path, "ga", "--seed", "x", PYTHONIOENCODING="ascii")
+    assert process.returncode == 2
+    assert "--seed" in process.stderr
+
+
+def test_an_arena_that_the_wheeled_robot_cannot_use_is_refused_first(refusal, here):
+    # the planar robot brings its own physics step, 0.02 s
+    (here / "mine.xml").write_text(arena(timestep=0.03))
+    refusal("ga", *TINY, "--arena", "mine.xml", "--output", "out")
+
+
+def test_a_checkpoint_of_another_seed_is_refused(refusal, unfinished, quick, capfd):
+    assert run(["ga", *TINY, "--seed", "8", "--output", "other"]) == 0
+    capfd.readouterr()
+    shutil.copy("other/checkpoint.npz", "run")
+    refusal("--resume", "run")
+
+
+def test_a_robot_changed_since_is_refused_on_resume(refusal, here, quick, capfd):
+    (here / "mine.xml").write_text(FULL)
+    argv = ["ga", *SHORT, "--robot", "mine.xml"]
+    assert run([*argv, "--evaluations", "10", "--output", "run"]) == 0
+    stored = json.loads((here / "run" / "provenance.json").read_text())
+    (here / "run" / "provenance.json").write_text(
+        json.dumps({**stored, "finished": None})
+    )
+    (here / "mine.xml").write_text(FULL.replace("kv=", "kv=  "))
+    capfd.readouterr()
+    refusal("--resume", "run")
+
+
+def test_a_run_on_an_own_robot_can_be_resumed_from_elsewhere(here, quick, monkeypatch):
+    (here / "mine.xml").write_text(FULL)
+    assert run(["ga", *SHORT, "--robot", "mine.xml", "--output", "run"]) == 0
+    (here / "run" / "provenance.json").unlink()
+    (here / "else").mkdir()
+    monkeypatch.chdir(here / "else")
+    assert run(["--resume", "../run"]) == 0
+
+
+def test_a_run_killed_while_it_wrote_its_config_can_be_started_again(here, quick):
+    (here / "run").mkdir()
+    (here / "run" / ".config.yaml-b2q7x_1c").write_text("seed: 7")
+    assert run(["ga", *SHORT, "--output", "run"]) == 0
+
+
+def test_leftovers_of_a_kill_are_not_shown(unfinished, quick, capsys):
+    (unfinished / ".checkpoint.npz-b2q7x_1c").write_bytes(b"PK")
+    assert run(["--resume", "run"]) == 0
+    assert "b2q7x_1c" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("content", ["", "{", "[1]", '{"resumed": 3}'])
+def test_a_damaged_provenance_is_refused(content, refusal, unfinished):
+    (unfinished / "provenance.json").write_text(content)
+    assert "run/provenance.json" in refusal("--resume", "run")
+
+
+@pytest.mark.parametrize("name", ["history.csv", "champion.json"])
+def test_what_cannot_be_written_later_is_a_user_error(name, unfinished, quick):
+    (unfinished / name).unlink(missing_ok=True)
+    (unfinished / name).mkdir()
+    with pytest.raises(UserError, match=name):
+        run(["--resume", "run"])
+
+
+@pytest.mark.parametrize("flag", ["", "--robot", "--output"])
+def test_a_name_too_long_for_a_file_is_refused(flag, refusal):
+    name = 300 * "a"
+    refusal(*(["ga", *TINY, flag, name] if flag else [name]))
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ["de-best", "--weight-bound", "1e308", "--weight-init", "1e308"],
+        ["ga", *TINY, "--threads", "100000000000000"],
+    ],
+)
+def test_a_number_out_of_all_proportion_is_refused(argv, refusal):
+    refusal(*argv, "--output", "out")
+
+
+@pytest.mark.parametrize(("offset", "bit"), [(10, 0), (8, 0)])
+def test_a_flipped_bit_in_the_checkpoints_directory_is_refused(
+    offset, bit, refusal, unfinished
+):
+    path = unfinished / "checkpoint.npz"
+    content = bytearray(path.read_bytes())
+    # method of compression and flags of the first entry
+    content[content.index(b"PK\x01\x02") + offset] ^= 1 << bit
+    path.write_bytes(content)
+    assert "run/checkpoint.npz" in refusal("--resume", "run")
