@@ -1,9 +1,10 @@
 """Which physics step is fine enough: `python -m benchmarks.convergence`.
 
-A fixed set of controllers (the hand-written wall follower and the evolved ones in
-benchmarks/controllers) lives 200 trials under each configuration. A configuration
-passes if every controller's mean fitness is within 5 % of the shipped configuration's
-at a fifth of the shipped step. Writes benchmarks/convergence.md.
+A fixed set of controllers (the hand-written wall follower, evolved champions, and a
+fragile one, evolved with a softer drive, that rides 0.4 mm off the wall) lives 200
+trials under each configuration. A configuration passes if every controller's mean fitness is
+within 2.5 % of the shipped configuration's at a fifth of the shipped step: half of the
+5 % that tests hold it to. Writes benchmarks/convergence.md.
 """
 
 import copy
@@ -24,10 +25,13 @@ from epuck_mj.simulation import SimulatedRobots
 from epuck_mj.starts import FreeSpace
 from epuck_mj.wall_follower import WallFollower
 
-CONTROLLERS = Path(__file__).resolve().parent / "controllers"
-REPORT = Path(__file__).resolve().with_name("convergence.md")
+HERE = Path(__file__).resolve().parent
+CHAMPIONS = HERE.parent / "results" / "default"
+FRAGILE = HERE / "controllers" / "fragile.json"
+REPORT = HERE / "convergence.md"
 TASK = TaskParameters()
 TOLERANCE = 0.05
+MARGIN = TOLERANCE / 2
 N_STARTS = 200
 REFINEMENT = 5
 """The reference's physics step is this many times smaller than the shipped one."""
@@ -95,7 +99,9 @@ def configurations(robot: str, shipped: float) -> list[Configuration]:
 
 def controllers(n: int) -> dict[str, BatchPolicy]:
     """The fixed set, each as a policy for `n` robots."""
-    evolved = {path.stem: load(path) for path in sorted(CONTROLLERS.glob("*.json"))}
+    files = sorted(CHAMPIONS.glob("*/champion.json"))
+    evolved = {path.parent.name: load(path) for path in files}
+    evolved["fragile"] = load(FRAGILE)
     policies: dict[str, BatchPolicy] = {"by hand": WallFollower()}
     for name, file in evolved.items():
         policies[name] = file.network.decode(np.tile(file.genome, (n, 1)))
@@ -138,7 +144,7 @@ class Options:
 
 def main(options: Options) -> None:
     """Measure, print and write the table."""
-    text = [HEADER.format(starts=options.starts, tolerance=TOLERANCE)]
+    text = [HEADER.format(starts=options.starts, margin=MARGIN)]
     for robot in STEPS:
         text += ["", f"## {robot}", "", *_table(robot, options.starts)]
     options.output.write_text("\n".join(text) + "\n")
@@ -165,7 +171,7 @@ def _table(robot: str, n_starts: int) -> list[str]:
         rows.append((configuration, fitness, off))
     unit = costs[Configuration(shipped)]
     for configuration, fitness, off in rows:
-        mark = "yes" if off <= TOLERANCE else "no"
+        mark = "yes" if off <= MARGIN else "no"
         mark += ", shipped" if configuration == Configuration(shipped) else ""
         lines.append(
             f"| {configuration.row()} | {_cells(fitness)} | {off:.1%} | "
@@ -195,9 +201,11 @@ def _cells(fitness: Mapping[str, float]) -> str:
 HEADER = """# Which physics step is fine enough
 
 Made by `python -m benchmarks.convergence`. Mean fitness of 300 over {starts} starts of
-the hand-written wall follower and of evolved controllers (benchmarks/controllers); the
-reference is the shipped configuration at a fifth of its step. Deviation: the largest of
-any controller; up to {tolerance:.0%} passes. Cost: CPU time, the shipped one's is 1."""
+the hand-written wall follower, of evolved champions (results/default) and of a fragile
+controller, evolved with a softer drive, that rides 0.4 mm off the wall. The reference
+is the shipped configuration at a fifth of its step. Deviation: the largest of any
+controller; up to {margin:.1%} passes, half of what the tests allow. Cost: CPU time of a
+control step, the shipped one's is 1; differences of a few per cent are noise."""
 
 if __name__ == "__main__":
     main(tyro.cli(Options))

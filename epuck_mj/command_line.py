@@ -40,7 +40,7 @@ def parse(
         with contextlib.redirect_stderr(box):
             return tyro.cli(
                 kind,
-                default=tyro.MISSING if default is None else default,
+                default=tyro.MISSING_NONPROP if default is None else default,
                 prog=prog,
                 args=list(argv),
                 config=(

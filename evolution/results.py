@@ -87,18 +87,19 @@ def write_results(
 
 
 def summary(controller: ControllerFile) -> str:
-    """Stored and held-out fitness side by side, in plain words."""
+    """Held-out fitness on each robot and stored fitness, a line each."""
     scores, steps = controller.scores, controller.task["steps"]
-    lines = [
-        f"Held-out fitness on {test['starts']} fresh starts, {robot}: "
-        f"{test['mean']:.1f} +- {test['standard_error']:.1f} of {steps}, "
-        f"{test['crash_rate']:.0%} of the trials crash"
-        for robot, test in scores["held_out"].items()
-    ]
-    lines.append(
-        f"Stored fitness {scores['stored']:.1f} of {steps}: what evolution believes"
+    tests = scores["held_out"]
+    starts = next(iter(tests.values()))["starts"]
+    held_out = ", ".join(
+        f"{robot} {test['mean']:.1f} +- {test['standard_error']:.1f} "
+        f"({test['crash_rate']:.0%} crash)"
+        for robot, test in tests.items()
     )
-    return "\n".join(lines)
+    return (
+        f"Held-out fitness of {steps}, mean of {starts} fresh starts: {held_out}\n"
+        f"Stored fitness of {steps}, what evolution believes: {scores['stored']:.1f}"
+    )
 
 
 def _controller_file(

@@ -277,16 +277,18 @@ def test_the_champions_file_pictures_and_recordings_can_be_read(finished):
 def test_the_summary_is_in_plain_words(finished):
     directory, process = finished
     scores = controller.load(directory / "champion.json").scores
-    first, planar, wheeled, stored, written, replay = process.stdout.splitlines()
+    first, fresh, stored, written, replay = process.stdout.splitlines()
     assert re.fullmatch(
         r"ga, seed 7: 60 evaluations in 6 generations, \d+ min \d+ s", first
     )
-    for line, robot in ((planar, "epuck_planar"), (wheeled, "epuck")):
+    assert fresh.startswith("Held-out fitness of 20, mean of 200 fresh starts: ")
+    for robot in ("epuck_planar", "epuck"):
         report = scores["held_out"][robot]
-        assert f"Held-out fitness on 200 fresh starts, {robot}: " in line
-        assert f" {report['mean']:.1f} +- {report['standard_error']:.1f} of 20" in line
-        assert f" {report['crash_rate']:.0%} of the trials crash" in line
-    assert stored.startswith(f"Stored fitness {scores['stored']:.1f} of 20")
+        mean, error = report["mean"], report["standard_error"]
+        assert f" {robot} {mean:.1f} +- {error:.1f} (" in fresh
+        assert f"({report['crash_rate']:.0%} crash)" in fresh
+    assert stored.startswith("Stored fitness of 20, ")
+    assert stored.endswith(f": {scores['stored']:.1f}")
     assert written == f"Written to run: {', '.join(sorted(PROMISED))}"
     assert replay.startswith("Replay: ")
     assert replay.endswith(" -m rerun run/champion.rrd")
@@ -380,8 +382,8 @@ def test_a_run_on_an_own_robot_of_another_name(here, quick, capsys):
     # an empty directory is as good as none
     assert run(["ga", *SHORT, "--robot", "mine.xml", "--output", "out"]) == 0
     out = capsys.readouterr().out
-    assert "fresh starts, mine.xml: " in out
-    assert "fresh starts, epuck: " in out
+    assert "fresh starts: mine.xml " in out
+    assert "crash), epuck " in out
     scene = controller.load("out/champion.json").scene
     assert scene["robot"] == str(here / "mine.xml")
     assert set(scene["mjcf_sha256"]) == {"arena", "robot"}
@@ -467,8 +469,8 @@ def test_a_bad_experiment_file_is_refused(content, words, refusal, here):
         (["ga", "--threads", "-1"], ("threads from 0 to 1024, got -1",)),
         (["ga", "--threads", "two"], ("--threads", "'two'")),
         (["ga", "--evaluations", "99"], ("one generation, 100", "got 99")),
-        (["ga", "--control-step", "0.03"], ("multiple", "0.02 s", "0.03 s")),
-        (["ga", "--control-step", "0.001"], ("multiple", "0.02 s", "0.001 s")),
+        (["ga", "--control-step", "0.03"], ("multiple", "0.025 s", "0.03 s")),
+        (["ga", "--control-step", "0.001"], ("multiple", "0.025 s", "0.001 s")),
         (["ga", "--start-clearance", "0.6"], ("no room for a start",)),
         (["ga", "--robot", "nope"], ("no robot 'nope'", "epuck, epuck_planar")),
         (["ga", "--arena", "nope"], ("no arena 'nope'", "arena")),
@@ -830,7 +832,7 @@ def test_a_terminal_without_unicode_gets_the_message_too(tmp_path):
 
 
 def test_an_arena_that_the_wheeled_robot_cannot_use_is_refused_first(refusal, here):
-    # the planar robot brings its own physics step, 0.02 s
+    # the planar robot brings its own physics step, 0.025 s
     (here / "mine.xml").write_text(arena(timestep=0.03))
     refusal("ga", *TINY, "--arena", "mine.xml", "--output", "out")
 
