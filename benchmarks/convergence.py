@@ -1,8 +1,8 @@
 """Which physics step is fine enough: `python -m benchmarks.convergence`.
 
-A fixed set of controllers (the hand-written wall follower, evolved champions, and a
-fragile one, evolved with a softer drive, that rides 0.4 mm off the wall) lives 200
-trials under each configuration. A configuration passes if every controller's mean fitness is
+A fixed set of controllers lives 200 trials under each configuration: the hand-written
+wall follower, evolved champions, and a fragile one, evolved with a softer drive, that
+rides 0.4 mm off the wall. A configuration passes if every controller's mean fitness is
 within 2.5 % of the shipped configuration's at a fifth of the shipped step: half of the
 5 % that tests hold it to. Writes benchmarks/convergence.md.
 """
