@@ -134,6 +134,7 @@ def _carry_out(
     try:
         with _interruptible():
             _evolve(experiment, directory)
+            print("Choosing the champion on fresh starts ...", file=sys.stderr)
             with writing(directory.path):
                 controller = write_results(experiment, scenes, directory, threads)
             directory.mark_finished()

@@ -297,6 +297,7 @@ def test_the_summary_is_in_plain_words(finished):
 def test_progress_is_on_stderr_one_line_for_a_generation(finished):
     _, process = finished
     lines = process.stderr.splitlines()
+    assert lines.pop() == "Choosing the champion on fresh starts ..."
     assert len(lines) == 6
     for i, line in enumerate(lines):
         pattern = rf" *{10 * (i + 1)} of 60 evaluations: gen={i} best=.* crash=\d+%"

@@ -1,0 +1,66 @@
+"""Progress on a terminal and without one."""
+
+import fcntl
+import os
+import pty
+import select
+import struct
+import subprocess
+import sys
+import termios
+from pathlib import Path
+
+from evolution.experiment import Record
+from evolution.progress import LINES, Progress
+
+ROOT = Path(__file__).resolve().parent.parent
+BUDGET = 4000
+
+
+def records() -> list[Record]:
+    return [Record(i, 100 * (i + 1), 2.0 * i, 1.0 * i, 0.5, 0.25) for i in range(40)]
+
+
+def show() -> None:
+    with Progress(BUDGET, 0) as progress:
+        for record in records():
+            progress.update(record)
+
+
+def shown_on_a_terminal(code: str) -> str:
+    """What a process with a real terminal of 140 columns writes to stderr."""
+    reader, writer = pty.openpty()
+    fcntl.ioctl(writer, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 140, 0, 0))
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], cwd=ROOT, stderr=writer, stdin=subprocess.DEVNULL
+    )
+    os.close(writer)
+    shown = b""
+    try:
+        while select.select([reader], [], [], 30)[0]:
+            try:
+                shown += os.read(reader, 4096)
+            except OSError:  # the other end is closed
+                break
+    finally:
+        os.close(reader)
+        process.kill()
+        process.wait(10)
+    return shown.decode()
+
+
+def test_a_terminal_gets_a_bar():
+    shown = shown_on_a_terminal("from tests import test_progress as t; t.show()")
+    last = shown.replace("\r", "\n").strip().splitlines()[-1]
+    for figure in ("100%", "4000/4000", "eval/s", "gen=39", "best=78.0", "crash=25%"):
+        assert figure in last
+
+
+def test_elsewhere_a_few_lines_are_enough(capsys):
+    show()
+    lines = capsys.readouterr().err.splitlines()
+    assert LINES <= len(lines) <= LINES + 1
+    assert lines[0].split() == [
+        *("100", "of", "4000", "evaluations:"),
+        *("gen=0", "best=0.0", "mean=0.0", "crash=25%"),
+    ]
