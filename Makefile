@@ -20,7 +20,7 @@ test: $(INSTALLED)
 	$(BIN)/python -m pytest -q -n 2 --durations=10
 
 bench: $(INSTALLED)
-	$(BIN)/python -m benchmarks.throughput
+	$(BIN)/python -m benchmarks.throughput --json results/throughput.json
 
 convergence: $(INSTALLED)
 	$(BIN)/python -m benchmarks.convergence

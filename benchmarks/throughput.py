@@ -9,6 +9,7 @@ turn count; the medians over all turns are reported. Shares of one core are rati
 CPU time; what two threads gain is wall time and wants an idle machine.
 """
 
+import itertools
 import json
 import os
 import statistics
@@ -20,6 +21,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import tyro
+from dm_control.rl import control
 
 from epuck_mj.control import TaskParameters, run_trials
 from epuck_mj.controller import Controller, Network
@@ -79,17 +81,19 @@ def main(options: Options) -> None:
 def measure(robot: str, repeats: int) -> dict[str, float]:
     """Medians of the ratios of interleaved repeats."""
     scene = load_scene(robot, "arena")
-    # everybody lives all steps: straight ahead, slowly, from the middle
-    task = TaskParameters(steps=30)
+    # small circles: everybody lives all steps
+    task = TaskParameters(steps=100)
     starts = FreeSpace(scene, 0.12).sample(np.random.default_rng(0), N_ROBOTS)
     controller = Network().decode(_harmless(N_ROBOTS))
     one, two = (SimulatedRobots(scene, N_ROBOTS, threads) for threads in (1, 2))
+    whole = TaskParameters()
+    env = environment(scene, FollowWalls(scene, whole, starts=itertools.cycle(starts)))
     turns = [
         Turn(
             mj_step=_rate(lambda: _mj_step(scene)),
             batch_1=_rate(lambda: _batch(one, controller, starts, task)),
             batch_2=_rate(lambda: _batch(two, controller, starts, task)),
-            dm_control=_rate(lambda: _dm_control(scene, controller, starts, task)),
+            dm_control=_rate(lambda: _dm_control(env, controller)),
         )
         for _ in range(repeats)
     ]
@@ -118,10 +122,10 @@ def _rate(work: Callable[[], int]) -> Rate:
 
 
 def _harmless(n: int) -> np.ndarray:
-    """Genomes that drive at a third of full speed, turning a little."""
+    """Genomes that drive circles of 3 to 5 cm at a third of full speed."""
     genomes = np.zeros((n, Network().n_genes))
     genomes[:, 32:36] = -0.35
-    genomes[:, 36:] = np.random.default_rng(1).uniform(-0.1, 0.1, (n, 1))
+    genomes[:, 36:] = np.random.default_rng(1).uniform(0.2, 0.3, (n, 1))
     return genomes
 
 
@@ -142,25 +146,21 @@ def _batch(
 ) -> int:
     """Our evaluator: a generation of trials, policy and fitness included."""
     trials = run_trials(robots, controller, starts, task)
+    assert trials.steps.min() == task.steps, "a crash would spoil the measurement"
     return int(trials.steps.sum()) * robots.scene.n_substeps
 
 
 def _dm_control(
-    scene: Scene,
-    controller: Controller,
-    starts: np.ndarray,
-    task: TaskParameters,
-    episodes: int = 20,
+    env: control.Environment, controller: Controller, episodes: int = 5
 ) -> int:
-    """A plain dm_control loop over some of the same trials."""
-    env = environment(scene, FollowWalls(scene, task, starts=starts))
+    """A plain dm_control loop over whole episodes."""
     n_steps = 0
     for i in range(episodes):
         policy, time_step = controller[i], env.reset()
         while not time_step.last():
             time_step = env.step(policy(time_step.observation["proximity"]))
-            n_steps += scene.n_substeps
-    return n_steps
+            n_steps += 1
+    return n_steps * round(env.control_timestep() / env.physics.timestep())
 
 
 if __name__ == "__main__":

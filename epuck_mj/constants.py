@@ -60,7 +60,7 @@ tyre friction be integrated with one physics step: see benchmarks/convergence.md
 """
 
 DRIVE_GAIN = 0.02
-"""Gain of a wheel's velocity servo [N m s/rad]: a time constant of 15 ms.
+"""Gain of a wheel's velocity servo [N m s/rad]: a time constant of about 15 ms.
 
 Chosen: the real motor takes a new rate at once (FIRMWARE), with its tyre slipping.
 """
@@ -81,7 +81,7 @@ TURN_RATE_MAX = 2 * SPEED_MAX / TRACK
 """Highest yaw rate, turning on the spot [rad/s]: 4.86."""
 
 N_PROXIMITY = 8
-"""Number of infra-red proximity sensors. MECH, PAPER."""
+"""Number of infra-red proximity sensors. FIRMWARE, PAPER."""
 
 PROXIMITY_ANGLES = (-17.2, -49.9, -90.0, -148.1, 148.1, 90.0, 49.9, 17.2)
 """Directions of ps0..ps7 [degrees from forward, left positive]. PLAYER.

@@ -163,7 +163,10 @@ class ControllerFile:
             raise ValueError(
                 f"expected {network.n_genes} finite genes, got {genome.size}"
             )
-        return cls(network, genome, fields["task"], fields["scene"], fields["scores"])
+        parts = [fields[name] for name in ("task", "scene", "scores")]
+        if not all(isinstance(part, dict) for part in parts):
+            raise ValueError("expected objects as task, scene and scores")
+        return cls(network, genome, *parts)
 
 
 FORMAT = "epuck_mj.controller/1"

@@ -64,9 +64,14 @@ def writing(folder: Path) -> Iterator[None]:
         raise UserError(f"cannot write '{name}': {error.strerror}") from None
 
 
+def leftovers(folder: Path) -> list[Path]:
+    """Temporary files of writers that were killed."""
+    return list(folder.glob(".*-????????"))
+
+
 def remove_leftovers(folder: Path) -> None:
-    """Remove temporary files of writers that were killed."""
-    for path in folder.glob(".*-????????"):
+    """Remove what killed writers left."""
+    for path in leftovers(folder):
         path.unlink(missing_ok=True)
 
 

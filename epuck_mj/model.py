@@ -6,6 +6,7 @@ differ in their base and nothing else: everybody else calls `Scene.qpos` and fri
 """
 
 import hashlib
+import itertools
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +21,11 @@ from epuck_mj.errors import UserError
 from epuck_mj.files import is_file
 from epuck_mj.sensors import Reading
 
-MODELS = Path(__file__).resolve().parent.parent / "models"
+_HERE = Path(__file__).resolve().parent
+# beside the package in a checkout, inside it where the wheel is installed
+MODELS = next(
+    folder for folder in (_HERE / "models", _HERE.parent / "models") if folder.is_dir()
+)
 SHIPPED_ROBOTS = ("epuck.xml", "epuck_planar.xml")
 ADDED_ROBOT = "robot added to the arena.xml"
 ROBOT_BODY = "epuck"
@@ -99,7 +104,7 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
     Args:
         robot: name of a shipped robot, or path of an MJCF with the same interface.
         arena: name of a shipped arena, or path of an MJCF with walls.
-        control_step: its duration [s], a multiple of the arena's physics step.
+        control_step: its duration [s], a multiple of the physics step.
 
     Raises:
         UserError: if a file is missing or broken, or a part of the robot is.
@@ -193,7 +198,7 @@ def _compile(make_spec, *args, source: Path) -> mujoco.MjModel:
         spec = make_spec(*args)
         # meshes and textures are looked for beside the file
         spec.modelfiledir = str(source.parent)
-        # a robot may know its own converged step better than the arena
+        # a robot that brings its converged step wants no other from the arena
         step = spec.numeric(TIMESTEP)
         if step is not None:
             spec.option.timestep = step.data[0]
@@ -213,6 +218,7 @@ def _index(
     """The scene of a compiled model that has all of the robot's parts."""
     _check_base(model, robot)
     _id(model, mujoco.mjtObj.mjOBJ_GEOM, SHELL, robot)
+    _check_floor(model, arena)
     wheels = [_id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name, robot) for name in WHEELS]
     distance = [
         _sensor(model, name, _SENSOR.mjSENS_RANGEFINDER, robot) for name in PROXIMITY
@@ -258,6 +264,37 @@ def _check_base(model: mujoco.MjModel, robot: Path) -> None:
         f"robot '{robot}': expected body '{ROBOT_BODY}' at the origin with a free "
         "joint or with slides along x and y and a hinge about z"
     )
+
+
+def _check_floor(model: mujoco.MjModel, arena: Path) -> None:
+    """Refuse a floor that the shell would hit, and wheels with nothing to drive on."""
+    ground = model.body_weldid[model.geom_bodyid] == 0
+    shell = model.geom(SHELL).id
+    level = ground & (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
+    for geom in np.flatnonzero(level).tolist():
+        if _collide(model, shell, geom):
+            raise UserError(
+                f"arena '{arena}': the robot's shell would hit the plane "
+                f"'{model.geom(geom).name or geom}'; expected a floor with "
+                'contype="2" conaffinity="2", which wheels meet and shells do not'
+            )
+    base = model.body_jntadr[model.body(ROBOT_BODY).id]
+    if model.jnt_type[base] != _JOINT.mjJNT_FREE:
+        return
+    pairs = itertools.product(
+        np.flatnonzero(~ground).tolist(), np.flatnonzero(ground).tolist()
+    )
+    if not any(_collide(model, *pair) for pair in pairs if pair[0] != shell):
+        raise UserError(
+            f"arena '{arena}' has no floor for the robot's wheels: expected a plane "
+            'with contype="2" conaffinity="2"'
+        )
+
+
+def _collide(model: mujoco.MjModel, first: int, second: int) -> bool:
+    """Whether two geoms can touch, by their bits."""
+    bits, masks = model.geom_contype, model.geom_conaffinity
+    return bool(bits[first] & masks[second] or bits[second] & masks[first])
 
 
 def _sensor(model: mujoco.MjModel, name: str, kind: int, robot: Path) -> int:

@@ -85,7 +85,7 @@ class FreeSpace:
         """Which grid nodes are free and enclosed by walls, `shape`."""
         poses = np.zeros((shape[0] * shape[1], 3))
         poses[:, :2] = self.origin + self.spacing * (np.indices(shape).reshape(2, -1).T)
-        checks = Batch(self._model, len(poses), 0)
+        checks = Batch(self._model, len(poses), 1)
         free = _free(checks, self._scene, poses).reshape(shape)
         parts = np.empty(shape, np.int32)
         ndimage.label(free, output=parts)

@@ -5,7 +5,17 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StrictBool,
+    StrictFloat,
+    StrictInt,
+    Tag,
+    ValidationError,
+)
 
 from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
 from epuck_mj.control import TaskParameters
@@ -48,41 +58,45 @@ OptimizerConfig = Annotated[
 class ExperimentConfig(BaseModel):
     """One run of evolution, but for how it is carried out (threads, engine, output)."""
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=False, allow_inf_nan=False
-    )
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    seed: int = Field(1, ge=0, description="seed of everything random")
-    evaluations: int = Field(
+    seed: StrictInt = Field(1, ge=0, description="seed of everything random")
+    evaluations: StrictInt = Field(
         30_000, ge=1, description="budget: individuals evaluated, whole generations"
     )
     robot: str = Field(
         "epuck_planar", description="epuck_planar, epuck (wheels) or an MJCF file"
     )
     arena: str = Field("arena", description="name of a shipped arena or an MJCF file")
-    trials: int = Field(5, ge=1, description="trials of an individual")
-    steps: int = Field(300, ge=1, description="control steps of a trial")
-    control_step: float = Field(0.1, gt=0, description="control step [s]")
+    trials: StrictInt = Field(5, ge=1, description="trials of an individual")
+    steps: StrictInt = Field(300, ge=1, description="control steps of a trial")
+    control_step: StrictFloat = Field(0.1, gt=0, description="control step [s]")
     fitness: Literal["product", "literal"] = Field(
         "product", description="step fitness: the paper's prose or its equation (2)"
     )
-    v_max: float = Field(SPEED_MAX, gt=0, description="forward speed at v = 1 [m/s]")
-    w_max: float = Field(TURN_RATE_MAX, gt=0, description="yaw rate at w = 1 [rad/s]")
-    sensor_range: float = Field(
+    v_max: StrictFloat = Field(
+        SPEED_MAX, gt=0, description="forward speed at v = 1 [m/s]"
+    )
+    w_max: StrictFloat = Field(
+        TURN_RATE_MAX, gt=0, description="yaw rate at w = 1 [rad/s]"
+    )
+    sensor_range: StrictFloat = Field(
         PROXIMITY_RANGE, gt=0, description="range of the proximity sensors [m]"
     )
-    start_clearance: float = Field(
+    start_clearance: StrictFloat = Field(
         START_CLEARANCE,
         gt=0,
         le=1,
         description="least distance to a wall at a start [m]",
     )
-    hidden: int = Field(4, ge=1, description="hidden neurons")
-    biases: bool = Field(False, description="give hidden and output neurons a bias")
-    weight_bound: float = Field(
+    hidden: StrictInt = Field(4, ge=1, description="hidden neurons")
+    biases: StrictBool = Field(
+        False, description="give hidden and output neurons a bias"
+    )
+    weight_bound: StrictFloat = Field(
         5.0, gt=0, le=1e6, description="weights stay within +- this"
     )
-    weight_init: float = Field(
+    weight_init: StrictFloat = Field(
         5.0, gt=0, le=1e6, description="first weights are uniform within +- this"
     )
     optimizer: OptimizerConfig

@@ -27,7 +27,6 @@ class Purpose(IntEnum):
     STARTS = 1
     VALIDATION = 2
     TEST = 3
-    SHOW = 4
 
 
 def random_generator(seed: int, *key: int) -> np.random.Generator:

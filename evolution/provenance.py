@@ -33,7 +33,7 @@ def provenance(
         },
         "git": _git(),
         "mjcf_sha256": dict(scene.sha256),
-        "platform": platform.platform(),
+        "platform": " ".join([platform.system(), *platform.libc_ver()]),
         "processor": _processor(),
         "started": now(),
         "finished": None,

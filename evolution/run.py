@@ -30,6 +30,7 @@ from evolution.run_directory import RunDirectory
 
 MODULE = "evolution.run"
 THREADS_MAX = 1024
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,13 @@ def run(argv: Sequence[str]) -> int:
     scenes = reported_scenes(experiment)
     source = provenance(experiment.scene, argv, options.engine, options.threads)
     if options.resume is not None:
-        directory.restore(experiment, source)
+        differing = directory.restore(experiment, source)
+        if differing:
+            print(
+                f"warning: {', '.join(differing)} differ from where this run began "
+                f"(see {directory.provenance}): its last bits may, too",
+                file=sys.stderr,
+            )
     else:
         directory.create(options.config, source)
     return _carry_out(experiment, scenes, directory, options.threads)
@@ -139,6 +146,8 @@ def _carry_out(
                 controller = write_results(experiment, scenes, directory, threads)
             directory.mark_finished()
     except _Interrupted as interruption:
+        for signum in SIGNALS:
+            signal.signal(signum, signal.SIG_IGN)
         print(
             f"Interrupted after {experiment.evaluations:,} evaluations; go on with: "
             + command(MODULE, "--resume", directory.path),
@@ -178,19 +187,23 @@ class _Interrupted(BaseException):
 
 @contextmanager
 def _interruptible() -> Iterator[None]:
-    """Turn SIGINT and SIGTERM into `_Interrupted`, once; then let us end in peace."""
-    signums = (signal.SIGINT, signal.SIGTERM)
+    """Turn SIGINT and SIGTERM into `_Interrupted`."""
 
     def interrupt(signum: int, frame: object) -> None:
-        for each in signums:
-            signal.signal(each, signal.SIG_IGN)
         raise _Interrupted(signum)
 
-    previous = {signum: signal.signal(signum, interrupt) for signum in signums}
-    yield
-    # after an interruption, they stay ignored until the process ends
-    for signum, handler in previous.items():
-        signal.signal(signum, handler)
+    previous = {signum: signal.signal(signum, interrupt) for signum in SIGNALS}
+    interrupted = False
+    try:
+        yield
+    except _Interrupted:
+        # a second one must not break what is being put in order
+        interrupted = True
+        raise
+    finally:
+        if not interrupted:
+            for signum, handler in previous.items():
+                signal.signal(signum, handler)
 
 
 def _replay(directory: RunDirectory) -> str:

@@ -37,7 +37,7 @@ class RunDirectory:
             UserError: if it does, or is not a directory.
         """
         try:
-            used = self.path.is_dir() and bool(self._visible())
+            used = self.path.is_dir() and bool(self._names())
         except OSError as error:
             raise UserError(
                 f"cannot write output '{self.path}': {error.strerror}"
@@ -92,8 +92,11 @@ class RunDirectory:
                 + ", ".join(differing)
             )
 
-    def restore(self, experiment: Experiment, provenance: dict) -> None:
+    def restore(self, experiment: Experiment, provenance: dict) -> list[str]:
         """Put the experiment where the checkpoint is; at its start if there is none.
+
+        Returns:
+            What differs from where the run began and may change its last bits.
 
         Raises:
             UserError: if the checkpoint cannot be read or belongs to something else,
@@ -117,6 +120,8 @@ class RunDirectory:
             files.write_text(self.history, experiment.history())
             resumed = [*first.get("resumed", ()), provenance]
             files.write_text(self.provenance, to_json({**first, "resumed": resumed}))
+        keys = ("versions", "git", "processor")
+        return [key for key in keys if first.get(key) != provenance[key]]
 
     def _refuse_other_models(self, first: dict, now: dict) -> None:
         before, after = first.get("mjcf_sha256"), now["mjcf_sha256"]
@@ -161,11 +166,12 @@ class RunDirectory:
 
     def contents(self) -> str:
         """Names of the files, for a person."""
-        return ", ".join(self._visible())
+        return ", ".join(self._names())
 
-    def _visible(self) -> list[str]:
-        names = (path.name for path in self.path.iterdir())
-        return sorted(name for name in names if not name.startswith("."))
+    def _names(self) -> list[str]:
+        """What is there, but for what a killed writer left behind."""
+        leftovers = set(files.leftovers(self.path))
+        return sorted(p.name for p in self.path.iterdir() if p not in leftovers)
 
     def _stored_provenance(self) -> dict:
         """What is known of the run's beginning; empty if it was killed before.

@@ -333,3 +333,15 @@ def test_frozen(name):
     )
     assert changed.optimizer.population == 9
     assert config.optimizer.population == PAPER[name]["population"]
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("evaluations", "true"), ("trials", "'5'"), ("biases", "'yes'"), ("seed", "2.0")],
+)
+def test_a_value_of_another_type_is_not_converted(key, value, config_file):
+    text = (CONFIGS / "ga.yaml").read_text().replace("trials: 5\n", "")
+    text = text.replace("evaluations: 30000\n", "")
+    assert f"{key}: Input should be a valid" in refusal(
+        config_file(f"{key}: {value}\n{text}")
+    )

@@ -261,3 +261,21 @@ def test_control_step_is_a_multiple_of_the_physics_step():
     assert "0.033 s" in refusal(control_step=0.033)
     assert "0.001 s" in refusal(control_step=0.001)
     assert load_scene("epuck", "arena", 0.05).n_substeps == 5
+
+
+FLOOR = '<geom name="floor" type="plane" size="1 1 0.1" contype="2" conaffinity="2"/>'
+
+
+def test_a_floor_that_shells_would_hit_is_named(tmp_path):
+    path = tmp_path / "arena.xml"
+    path.write_text(WALLS.replace(' contype="2" conaffinity="2"', ""))
+    for robot in ("epuck", "epuck_planar"):
+        assert "shell would hit the plane 'floor'" in refusal(robot, path)
+
+
+def test_wheels_need_a_floor_and_the_planar_robot_none(tmp_path):
+    path = tmp_path / "arena.xml"
+    assert FLOOR in WALLS
+    path.write_text(WALLS.replace(FLOOR, ""))
+    assert "has no floor for the robot's wheels" in refusal("epuck", path)
+    assert load_scene("epuck_planar", str(path)).model.nq == 3
