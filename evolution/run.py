@@ -149,7 +149,7 @@ def _carry_out(
         for signum in SIGNALS:
             signal.signal(signum, signal.SIG_IGN)
         print(
-            f"Interrupted after {experiment.evaluations:,} evaluations; go on with: "
+            f"Interrupted after {directory.evaluations():,} evaluations; go on with: "
             + command(MODULE, "--resume", directory.path),
             file=sys.stderr,
         )

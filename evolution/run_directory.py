@@ -153,6 +153,12 @@ class RunDirectory:
                 f"is intact: --resume {self.path}"
             ) from None
 
+    def evaluations(self) -> int:
+        """Individuals evaluated up to the checkpoint."""
+        if not self.checkpoint.exists():
+            return 0
+        return int(files.read_arrays(self.checkpoint)["records"][-1, 1])
+
     @property
     def finished(self) -> bool:
         """Whether the run has written everything."""
