@@ -23,6 +23,7 @@ from epuck_mj.controller import load
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.simulation import SimulatedRobots
 from epuck_mj.starts import FreeSpace
+from epuck_mj.tasks import START_CLEARANCE
 from epuck_mj.wall_follower import WallFollower
 
 HERE = Path(__file__).resolve().parent
@@ -110,7 +111,7 @@ def controllers(n: int) -> dict[str, BatchPolicy]:
 
 def held_out_starts(scene: Scene, n: int) -> np.ndarray:
     """Starts `(n, 3)` that no run has seen."""
-    return FreeSpace(scene, 0.01).sample(np.random.default_rng(2026), n)
+    return FreeSpace(scene, START_CLEARANCE).sample(np.random.default_rng(2026), n)
 
 
 def mean_fitness(

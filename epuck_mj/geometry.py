@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from epuck_mj.model import PROXIMITY, SHELL, Scene
+from epuck_mj.model import PROXIMITY, SHELL, Scene, can_touch, static
 
 UNSET_COLOR = np.array([0.5, 0.5, 0.5, 1], np.float32)
 """Colour that MuJoCo gives to geoms without one."""
@@ -14,16 +14,7 @@ COLLISION_GROUP = 3
 
 def walls(model: mujoco.MjModel) -> np.ndarray:
     """Which geoms stand still and can be hit by the robot's shell, `(ngeom,)`."""
-    shell = model.geom(SHELL)
-    hits = (model.geom_contype & shell.conaffinity) | (
-        model.geom_conaffinity & shell.contype
-    )
-    return (hits != 0) & static(model)
-
-
-def static(model: mujoco.MjModel) -> np.ndarray:
-    """Which geoms are fixed to the world, `(ngeom,)`."""
-    return model.body_weldid[model.geom_bodyid] == 0
+    return can_touch(model, model.geom(SHELL).id) & static(model)
 
 
 def moving_bodies(model: mujoco.MjModel) -> list[int]:

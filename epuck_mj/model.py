@@ -6,7 +6,6 @@ differ in their base and nothing else: everybody else calls `Scene.qpos` and fri
 """
 
 import hashlib
-import itertools
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -268,33 +267,34 @@ def _check_base(model: mujoco.MjModel, robot: Path) -> None:
 
 def _check_floor(model: mujoco.MjModel, arena: Path) -> None:
     """Refuse a floor that the shell would hit, and wheels with nothing to drive on."""
-    ground = model.body_weldid[model.geom_bodyid] == 0
-    shell = model.geom(SHELL).id
-    level = ground & (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
-    for geom in np.flatnonzero(level).tolist():
-        if _collide(model, shell, geom):
-            raise UserError(
-                f"arena '{arena}': the robot's shell would hit the plane "
-                f"'{model.geom(geom).name or geom}'; expected a floor with "
-                'contype="2" conaffinity="2", which wheels meet and shells do not'
-            )
+    shell, ground = model.geom(SHELL).id, static(model)
+    planes = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
+    for geom in np.flatnonzero(ground & planes & can_touch(model, shell)).tolist():
+        raise UserError(
+            f"arena '{arena}': the robot's shell would hit the plane "
+            f"'{model.geom(geom).name or geom}'; expected a floor with "
+            'contype="2" conaffinity="2", which wheels meet and shells do not'
+        )
     base = model.body_jntadr[model.body(ROBOT_BODY).id]
     if model.jnt_type[base] != _JOINT.mjJNT_FREE:
         return
-    pairs = itertools.product(
-        np.flatnonzero(~ground).tolist(), np.flatnonzero(ground).tolist()
-    )
-    if not any(_collide(model, *pair) for pair in pairs if pair[0] != shell):
+    others = (geom for geom in np.flatnonzero(~ground).tolist() if geom != shell)
+    if not any((ground & can_touch(model, geom)).any() for geom in others):
         raise UserError(
             f"arena '{arena}' has no floor for the robot's wheels: expected a plane "
             'with contype="2" conaffinity="2"'
         )
 
 
-def _collide(model: mujoco.MjModel, first: int, second: int) -> bool:
-    """Whether two geoms can touch, by their bits."""
+def static(model: mujoco.MjModel) -> np.ndarray:
+    """Which geoms are fixed to the world, `(ngeom,)`."""
+    return model.body_weldid[model.geom_bodyid] == 0
+
+
+def can_touch(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """Which geoms a geom can touch, by their collision bits, `(ngeom,)`."""
     bits, masks = model.geom_contype, model.geom_conaffinity
-    return bool(bits[first] & masks[second] or bits[second] & masks[first])
+    return ((bits[geom] & masks) | (bits & masks[geom])) != 0
 
 
 def _sensor(model: mujoco.MjModel, name: str, kind: int, robot: Path) -> int:

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from numpy.typing import ArrayLike
 
+from epuck_mj import colors
 from epuck_mj.control import TaskParameters
 from epuck_mj.errors import UserError
 from epuck_mj.files import write_bytes
@@ -24,8 +25,8 @@ from epuck_mj.model import Scene
 from epuck_mj.outline import shell_outline, wall_outlines
 from epuck_mj.trajectory import Trajectory
 
-# Okabe and Ito's colours, told apart by the colour-blind too
-BLUE, VERMILION = "#0072B2", "#D55E00"
+# matplotlib counts to 1
+BLUE, VERMILION = (tuple(np.array(c) / 255) for c in (colors.BLUE, colors.VERMILION))
 
 # yellow to dark blue, without the end that white paper swallows
 FITNESS_COLORS = ListedColormap(colormaps["cividis_r"](np.linspace(0.1, 1, 256)))
