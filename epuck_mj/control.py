@@ -8,11 +8,14 @@ import numpy as np
 
 from epuck_mj.constants import PROXIMITY_RANGE
 from epuck_mj.errors import UserError
-from epuck_mj.fitness import StepFitness, step_fitness
+from epuck_mj.fitness import STEP_FITNESS_MAX, StepFitness, step_fitness
 from epuck_mj.motors import Speeds, command
 from epuck_mj.sensors import Reading, observe
 
 Policy = Callable[[np.ndarray], np.ndarray]
+
+Lost = Callable[[np.ndarray], np.ndarray]
+"""Which trials need not go on, `(trials,)`, given the most each can still reach."""
 
 
 class Robot(Protocol):
@@ -133,7 +136,11 @@ class BatchPolicy(Protocol):
 
 
 def run_trials(
-    robots: Robots, policy: BatchPolicy, starts: np.ndarray, task: TaskParameters
+    robots: Robots,
+    policy: BatchPolicy,
+    starts: np.ndarray,
+    task: TaskParameters,
+    lost: Lost | None = None,
 ) -> Trials:
     """One trial per start; a robot that crashes is not stepped again.
 
@@ -142,6 +149,8 @@ def run_trials(
         policy: one member per start.
         starts: poses `(trials, 3)`: x, y [m], yaw [rad].
         task: what a trial is.
+        lost: asked after every step which trials to break off, uncrashed, with what
+            they have earned so far; None lets all of them live.
     """
     n_trials = len(starts)
     fitness = np.zeros(n_trials)
@@ -149,16 +158,19 @@ def run_trials(
     crashed = np.zeros(n_trials, bool)
     active = np.arange(n_trials)
     observation = observe(robots.reset(starts).distance, task.sensor_range)
-    for _ in range(task.steps):
+    for left in reversed(range(task.steps)):
         step = control_step(robots, policy, observation, task)
         observation = step.observation
         fitness[active] += step.fitness
         steps[active] += 1
-        # the crashed leave; everything kept per robot follows
-        contact = step.reading.contact
-        if contact.any():
-            crashed[active[contact]] = True
-            alive = ~contact
+        alive = ~step.reading.contact
+        crashed[active] = ~alive
+        if lost is not None:
+            most = fitness.copy()
+            most[active[alive]] += left * STEP_FITNESS_MAX
+            alive &= ~lost(most)[active]
+        # those who are done leave; everything kept per robot follows
+        if not alive.all():
             active, observation = active[alive], observation[alive]
             if not active.size:
                 break

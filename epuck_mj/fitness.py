@@ -15,6 +15,9 @@ from epuck_mj.errors import UserError
 
 StepFitness = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
+STEP_FITNESS_MAX = 1.0
+"""No control step is worth more."""
+
 
 def fast(action: np.ndarray) -> np.ndarray:
     """Forward drive v in [0, 1], `(...,)`."""

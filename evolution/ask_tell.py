@@ -78,7 +78,7 @@ def pending(asked: np.ndarray | None) -> np.ndarray:
         AskTellError: there are none.
     """
     if asked is None:
-        raise AskTellError("cannot tell: expected ask() first")
+        raise AskTellError("nothing to tell: expected ask() first")
     return asked
 
 

@@ -190,6 +190,20 @@ class DifferentialEvolution:
         self._asked = asked
         return asked.copy()
 
+    def to_beat(self) -> np.ndarray:
+        """Fitness `(n,)` to exceed: a trial that does not beat its parent is forgotten.
+
+        Without a limit in the initial population and where parents are re-evaluated,
+        which changes what is to be beaten.
+
+        Raises:
+            AskTellError: nothing was asked.
+        """
+        asked = pending(self._asked)
+        if self.generation == 0 or self._parameters.reevaluate_parents:
+            return np.full(len(asked), -np.inf)
+        return self.fitness.copy()
+
     def tell(self, fitness: ArrayLike) -> None:
         """Let each trial replace its parent if it is strictly better.
 

@@ -2,6 +2,10 @@
 
 Two engines with the same bits: `batch` steps all robots at once on
 `mujoco.batch.Batch`; `dm_control` steps the dm_control task, one trial after another.
+
+Racing: an individual that only matters if it beats a known fitness is broken off as
+soon as it no longer can, since no control step is worth more than 1. Whoever beats
+what it has to has lived all its trials, so no comparison comes out differently.
 """
 
 from collections.abc import Iterator
@@ -19,10 +23,15 @@ from epuck_mj.tasks import FollowWalls, environment
 CAPACITY = 1024
 """Robots simulated at once: bounds memory, changes no result."""
 
+ROUNDING = 1e-9
+"""By how much an individual must have lost its race: sums of floats are inexact."""
+
 
 @dataclass(frozen=True)
 class Evaluation:
     """Trials of `(individuals,)` genomes on `(trials,)` starts.
+
+    Of an individual that lost its race they are what they were when it was broken off.
 
     Attributes:
         trial_fitness: sum of the step fitness, `(individuals, trials)`.
@@ -40,11 +49,43 @@ class Evaluation:
         return self.trial_fitness.mean(axis=-1)
 
 
+@dataclass(frozen=True)
+class Race:
+    """What individuals `(individuals,)` have to beat; their trials follow one another.
+
+    Attributes:
+        to_beat: fitness to exceed, -inf where every fitness matters.
+        trials: of each individual.
+    """
+
+    to_beat: np.ndarray
+    trials: int
+
+    def lost(self, most: np.ndarray) -> np.ndarray:
+        """Which trials `(individuals * trials,)` need not go on.
+
+        Args:
+            most: what each of them can still reach.
+        """
+        fitness = most.reshape(-1, self.trials).mean(axis=-1)
+        return np.repeat(fitness < self.to_beat - ROUNDING, self.trials)
+
+    def __getitem__(self, chunk: slice) -> "Race":
+        """The race of the individuals whose trials a slice holds."""
+        first, last = chunk.start // self.trials, chunk.stop // self.trials
+        return Race(self.to_beat[first:last], self.trials)
+
+
 class Engine(Protocol):
     """Runs one trial per member of a batch of controllers."""
 
-    def run(self, controller: Controller, starts: np.ndarray) -> Trials:
-        """Outcome of `(n,)` trials of `(n,)` controllers on `(n, 3)` starts."""
+    def run(
+        self, controller: Controller, starts: np.ndarray, race: Race | None = None
+    ) -> Trials:
+        """Outcome of `(n,)` trials of `(n,)` controllers on `(n, 3)` starts.
+
+        With a `race`, trials of individuals that can only lose may be broken off.
+        """
         ...
 
 
@@ -56,11 +97,23 @@ class BatchEngine:
         self._task = task
         self._robots = SimulatedRobots(scene, CAPACITY, threads)
 
-    def run(self, controller: Controller, starts: np.ndarray) -> Trials:
+    def run(
+        self, controller: Controller, starts: np.ndarray, race: Race | None = None
+    ) -> Trials:
         """See `Engine.run`."""
+        trials = 1 if race is None else race.trials
+        if trials > CAPACITY:
+            # an individual does not fit: nobody is broken off
+            trials, race = 1, None
         parts = [
-            run_trials(self._robots, controller[chunk], starts[chunk], self._task)
-            for chunk in _chunks(len(starts))
+            run_trials(
+                self._robots,
+                controller[chunk],
+                starts[chunk],
+                self._task,
+                None if race is None else race[chunk].lost,
+            )
+            for chunk in _chunks(len(starts), trials)
         ]
         return _joined(parts)
 
@@ -73,8 +126,10 @@ class DmControlEngine:
         self._scene = scene
         self._task = task
 
-    def run(self, controller: Controller, starts: np.ndarray) -> Trials:
-        """See `Engine.run`."""
+    def run(
+        self, controller: Controller, starts: np.ndarray, race: Race | None = None
+    ) -> Trials:
+        """See `Engine.run`; every trial is lived to its end."""
         task = FollowWalls(self._scene, self._task, starts=starts)
         env = environment(self._scene, task)
         fitness = np.zeros(len(starts))
@@ -91,7 +146,11 @@ class DmControlEngine:
 
 
 def evaluate(
-    engine: Engine, network: Network, genomes: np.ndarray, starts: np.ndarray
+    engine: Engine,
+    network: Network,
+    genomes: np.ndarray,
+    starts: np.ndarray,
+    to_beat: np.ndarray | None = None,
 ) -> Evaluation:
     """All individuals on all starts.
 
@@ -100,10 +159,13 @@ def evaluate(
         network: shape of the genomes.
         genomes: `(individuals, genes)`.
         starts: poses `(trials, 3)`, x, y [m], yaw [rad]: the same for everybody.
+        to_beat: fitness `(individuals,)` below which nobody cares how far below;
+            None if every fitness matters.
     """
     shape = (len(genomes), len(starts))
     controller = network.decode(np.repeat(genomes, len(starts), axis=0))
-    trials = engine.run(controller, np.tile(starts, (len(genomes), 1)))
+    race = None if to_beat is None else Race(to_beat, len(starts))
+    trials = engine.run(controller, np.tile(starts, (len(genomes), 1)), race)
     return Evaluation(
         trials.fitness.reshape(shape),
         trials.steps.reshape(shape),
@@ -111,9 +173,11 @@ def evaluate(
     )
 
 
-def _chunks(n: int) -> Iterator[slice]:
-    for first in range(0, n, CAPACITY):
-        yield slice(first, min(first + CAPACITY, n))
+def _chunks(n: int, whole: int) -> Iterator[slice]:
+    """Slices of at most `CAPACITY` of `n` trials; groups of `whole` stay together."""
+    size = CAPACITY - CAPACITY % whole
+    for first in range(0, n, size):
+        yield slice(first, min(first + size, n))
 
 
 def _joined(parts: list[Trials]) -> Trials:

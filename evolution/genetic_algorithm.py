@@ -201,6 +201,14 @@ class GeneticAlgorithm:
         self._asked = asked
         return self._decoded(asked)
 
+    def to_beat(self) -> np.ndarray:
+        """-inf `(n,)`: tournaments compare whatever fitness there is.
+
+        Raises:
+            AskTellError: nothing was asked.
+        """
+        return np.full(len(pending(self._asked)), -np.inf)
+
     def tell(self, fitness: ArrayLike) -> None:
         """Make the generation asked the current one.
 

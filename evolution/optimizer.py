@@ -64,6 +64,17 @@ class Optimizer(Protocol):
         """
         ...
 
+    def to_beat(self) -> np.ndarray:
+        """Fitness `(n,)` that each genome asked has to exceed to change anything.
+
+        A genome that cannot may be told any fitness that does not exceed it either;
+        -inf where every fitness matters.
+
+        Raises:
+            AskTellError: nothing was asked.
+        """
+        ...
+
     def tell(self, fitness: ArrayLike) -> None:
         """Accept the fitness `(n,)` of the genomes asked; NaN counts as -inf.
 
