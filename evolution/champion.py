@@ -18,7 +18,7 @@ HELD_OUT_SEED = 0
 """Seed of validation and test starts: no run's seed reaches their streams."""
 
 N_VALIDATION = 200
-N_TEST = 200
+N_TEST = 1000
 
 BEST_OF_POPULATION = 0.1
 """Share of the final population that are candidates."""
@@ -34,7 +34,7 @@ def starts_for_validation(space: FreeSpace) -> np.ndarray:
 
 
 def starts_for_test(space: FreeSpace) -> np.ndarray:
-    """The starts on which champions are reported, `(200, 3)`."""
+    """The starts on which champions are reported, `(1000, 3)`."""
     return space.sample(random_generator(HELD_OUT_SEED, Purpose.TEST), N_TEST)
 
 

@@ -36,7 +36,7 @@ def random_generator(seed: int, *key: int) -> np.random.Generator:
 
 @dataclass(frozen=True)
 class Record:
-    """One generation, as in history.csv.
+    """One generation: what came of it, then what it cost.
 
     Attributes:
         generation: counted from 0, the initial population.
@@ -44,7 +44,9 @@ class Record:
         best: highest stored fitness of the population.
         mean: mean stored fitness of the population.
         std: its standard deviation.
-        crash_rate: share of this generation's trials that ended in a crash.
+        control_steps: of all its trials together; racing makes them fewer.
+        crash_rate: share of its trials that ended in a crash; racing breaks some off
+            before they can.
     """
 
     generation: int
@@ -52,20 +54,28 @@ class Record:
     best: float
     mean: float
     std: float
+    control_steps: int
     crash_rate: float
 
+
+KINDS = (int, int, float, float, float, int, float)
 
 ARRAYS = {"records": len(Record.__dataclass_fields__), "best_genomes": None}
 """Arrays of a state, one row per generation, and their columns (None: genes)."""
 
-HISTORY_HEADER = ",".join(Record.__dataclass_fields__)
+HISTORY = ("generation", "evaluations", "best", "mean", "std")
+"""Columns of history.csv: racing changes none of them."""
 
 
 class Experiment:
     """A run of evolution that can be stopped and resumed between generations."""
 
     def __init__(
-        self, config: ExperimentConfig, engine: str = "batch", threads: int = 0
+        self,
+        config: ExperimentConfig,
+        engine: str = "batch",
+        threads: int = 0,
+        racing: bool = True,
     ):
         """Load the scene and draw the first population.
 
@@ -73,6 +83,7 @@ class Experiment:
             config: what to do.
             engine: one of `ENGINES`: how trials are stepped, not what they give.
             threads: of the batch engine; 0 is one per core.
+            racing: break off individuals that can only lose; changes no result.
 
         Raises:
             UserError: if robot or arena cannot be used, or the budget is too small.
@@ -81,6 +92,7 @@ class Experiment:
         self.scene = load_scene(config.robot, config.arena, config.control_step)
         self.space = FreeSpace(self.scene, config.start_clearance)
         self.engine = make_engine(engine, self.scene, config, threads)
+        self.racing = racing
         self.optimizer = _optimizer(config)
         self.records: list[Record] = []
         self.best_genomes: list[np.ndarray] = []
@@ -114,7 +126,8 @@ class Experiment:
         rng = random_generator(config.seed, Purpose.STARTS, generation)
         starts = self.space.sample(rng, config.trials)
         genomes = self.optimizer.ask()
-        evaluation = evaluate(self.engine, config.network, genomes, starts)
+        to_beat = self.optimizer.to_beat() if self.racing else None
+        evaluation = evaluate(self.engine, config.network, genomes, starts, to_beat)
         self.optimizer.tell(evaluation.fitness)
         fitness = self.optimizer.fitness
         record = Record(
@@ -123,6 +136,7 @@ class Experiment:
             best=float(fitness.max()),
             mean=float(fitness.mean()),
             std=float(fitness.std()),
+            control_steps=int(evaluation.steps.sum()),
             crash_rate=float(evaluation.crashed.mean()),
         )
         self.records.append(record)
@@ -154,8 +168,8 @@ class Experiment:
             }
         )
         self.records = [
-            Record(int(generation), int(evaluations), *map(float, rest))
-            for generation, evaluations, *rest in records
+            Record(*(kind(x) for kind, x in zip(KINDS, row, strict=True)))
+            for row in records
         ]
         self.best_genomes = list(genomes)
 
@@ -173,8 +187,11 @@ class Experiment:
 
     def history(self) -> str:
         """Text of history.csv: no clock in it, floats that read back exactly."""
-        rows = [",".join(map(repr, astuple(record))) for record in self.records]
-        return "\n".join([HISTORY_HEADER, *rows]) + "\n"
+        rows = [
+            ",".join(repr(getattr(record, name)) for name in HISTORY)
+            for record in self.records
+        ]
+        return "\n".join([",".join(HISTORY), *rows]) + "\n"
 
 
 def _optimizer(config: ExperimentConfig) -> Optimizer:

@@ -30,6 +30,10 @@ from evolution.run_directory import RunDirectory
 
 MODULE = "evolution.run"
 THREADS_MAX = 1024
+
+SAVE_INTERVAL = 1.0
+"""Least time between two checkpoints [s]: a generation can be shorter than a save."""
+
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -46,6 +50,8 @@ class Options:
         threads: threads that step the robots; 0 is one per core. Changes no result.
         engine: batch steps all robots at once, dm_control one trial after the other.
             Changes no result.
+        racing: break off individuals that can only lose, where the optimiser allows it
+            (--no-racing lets them live). Changes no result.
         print_config: print the resolved YAML and run nothing.
     """
 
@@ -55,6 +61,7 @@ class Options:
     resume: Path | None = None
     threads: int = 0
     engine: Literal["batch", "dm_control"] = "batch"
+    racing: bool = True
     print_config: bool = False
 
 
@@ -83,7 +90,9 @@ def run(argv: Sequence[str]) -> int:
         default = Path("runs") / f"{stem}-seed-{options.config.seed}"
         directory = RunDirectory(options.output or default)
         directory.refuse_if_used()
-    experiment = Experiment(options.config, options.engine, options.threads)
+    experiment = Experiment(
+        options.config, options.engine, options.threads, options.racing
+    )
     # found out now, not after the evolution
     scenes = reported_scenes(experiment)
     source = provenance(experiment.scene, argv, options.engine, options.threads)
@@ -167,14 +176,18 @@ def _carry_out(
 
 
 def _evolve(experiment: Experiment, directory: RunDirectory) -> None:
-    """Go through the generations that are left, saving each."""
+    """Go through the generations that are left, saving on the way."""
     with Progress(experiment.config.evaluations, experiment.evaluations) as progress:
-        before = time.monotonic()
+        saved = before = time.monotonic()
+        seconds = []
         for record in experiment.run():
             after = time.monotonic()
-            directory.save(experiment, after - before)
-            progress.update(record)
+            seconds.append(after - before)
             before = after
+            if after - saved > SAVE_INTERVAL or experiment.finished:
+                directory.save(experiment, seconds)
+                saved, seconds = after, []
+            progress.update(record)
 
 
 class _Interrupted(BaseException):

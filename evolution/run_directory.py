@@ -1,6 +1,7 @@
 """The run directory: what a run leaves behind, and what it can be resumed from."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -131,8 +132,12 @@ class RunDirectory:
                 f"since (SHA-256 {before}, now {after})"
             )
 
-    def save(self, experiment: Experiment, seconds: float) -> None:
-        """Checkpoint, then what can be derived from it; `seconds` of this generation.
+    def save(self, experiment: Experiment, seconds: Sequence[float]) -> None:
+        """Checkpoint, then what can be derived from it.
+
+        Args:
+            experiment: to save.
+            seconds: that each generation since the last save took.
 
         Raises:
             UserError: if the directory can no longer be written; what was there
@@ -145,8 +150,14 @@ class RunDirectory:
             files.write_text(self.history, experiment.history())
             with self.timing.open("a", encoding="utf-8") as file:
                 if file.tell() == 0:
-                    file.write("generation,seconds\n")
-                file.write(f"{experiment.records[-1].generation},{seconds:.3f}\n")
+                    file.write("generation,seconds,control_steps,crash_rate\n")
+                file.writelines(
+                    f"{record.generation},{taken:.3f},{record.control_steps},"
+                    f"{record.crash_rate:.4f}\n"
+                    for record, taken in zip(
+                        experiment.records[-len(seconds) :], seconds, strict=True
+                    )
+                )
         except OSError as error:
             raise UserError(
                 f"cannot write '{self.path}': {error.strerror}; what was there before "
