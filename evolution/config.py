@@ -2,7 +2,7 @@
 
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import yaml
 from pydantic import (
@@ -132,6 +132,27 @@ class ExperimentConfig(BaseModel):
         """The resolved config: every key, in the order above."""
         return yaml.safe_dump(self.model_dump(), sort_keys=False)
 
+    @classmethod
+    def parsed(cls, fields: Any, where: str) -> Self:
+        """The config that keys and values make.
+
+        Raises:
+            UserError: beginning with `where`, if they make none.
+        """
+        try:
+            return cls.model_validate(fields)
+        except ValidationError as error:
+            raise UserError(f"{where}: {one_line(error)}") from None
+
+
+def shipped_experiments() -> dict[str, Path]:
+    """Files of the shipped experiments by name; studies are kept beside them."""
+    return {
+        path.stem: path
+        for path in sorted(CONFIGS.glob("*.yaml"))
+        if "optimizer" in read_mapping(path)
+    }
+
 
 def find_config(experiment: str) -> Path:
     """The file of a shipped experiment, or the user's own.
@@ -139,7 +160,7 @@ def find_config(experiment: str) -> Path:
     Raises:
         UserError: if there is none.
     """
-    shipped = {path.stem: path for path in sorted(CONFIGS.glob("*.yaml"))}
+    shipped = shipped_experiments()
     path = shipped.get(experiment, Path(experiment))
     if is_file(path):
         return path
@@ -155,6 +176,32 @@ def load_config(path: Path) -> ExperimentConfig:
     Raises:
         UserError: if the file is missing, not YAML, or says something unknown.
     """
+    return ExperimentConfig.parsed(read_mapping(path), f"'{path}'")
+
+
+def differing_keys(stored: ExperimentConfig, asked: ExperimentConfig) -> list[str]:
+    """What two configs disagree about, a text for each key."""
+    before, after = _flat(stored), _flat(asked)
+    return [
+        f"{key} (stored {before.get(key)}, got {after.get(key)})"
+        for key in dict.fromkeys([*before, *after])
+        if before.get(key) != after.get(key)
+    ]
+
+
+def _flat(config: ExperimentConfig) -> dict[str, Any]:
+    """Keys and values, the optimiser's as `optimizer.<key>`."""
+    fields = config.model_dump()
+    optimizer = fields.pop("optimizer")
+    return fields | {f"optimizer.{key}": value for key, value in optimizer.items()}
+
+
+def read_mapping(path: Path) -> dict[Any, Any]:
+    """The keys and values of a YAML file.
+
+    Raises:
+        UserError: if it is missing, not YAML, or anything but a mapping.
+    """
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
@@ -168,10 +215,7 @@ def load_config(path: Path) -> ExperimentConfig:
             f"'{path}': expected a mapping of keys to values, "
             f"got {type(content).__name__}"
         )
-    try:
-        return ExperimentConfig.model_validate(content)
-    except ValidationError as error:
-        raise UserError(f"'{path}': {one_line(error)}") from None
+    return content
 
 
 def one_line(error: ValidationError) -> str:

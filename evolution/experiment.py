@@ -58,8 +58,6 @@ class Record:
     crash_rate: float
 
 
-KINDS = (int, int, float, float, float, int, float)
-
 ARRAYS = {"records": len(Record.__dataclass_fields__), "best_genomes": None}
 """Arrays of a state, one row per generation, and their columns (None: genes)."""
 
@@ -168,8 +166,8 @@ class Experiment:
             }
         )
         self.records = [
-            Record(*(kind(x) for kind, x in zip(KINDS, row, strict=True)))
-            for row in records
+            Record(int(index), int(spent), best, mean, std, int(steps), crashed)
+            for index, spent, best, mean, std, steps, crashed in records.tolist()
         ]
         self.best_genomes = list(genomes)
 

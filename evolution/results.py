@@ -89,16 +89,25 @@ def write_results(
 def summary(controller: ControllerFile) -> str:
     """Held-out fitness on each robot and stored fitness, a line each."""
     scores, steps = controller.scores, controller.task["steps"]
-    tests = scores["held_out"]
-    starts = next(iter(tests.values()))["starts"]
-    held_out = ", ".join(
+    starts = next(iter(scores["held_out"].values()))["starts"]
+    return (
+        f"Held-out fitness of {steps}, mean of {starts} fresh starts: "
+        f"{_held_out(controller)}\n"
+        f"Stored fitness of {steps}, what evolution believes: {scores['stored']:.1f}"
+    )
+
+
+def scores(controller: ControllerFile) -> str:
+    """The same in short."""
+    stored = controller.scores["stored"]
+    return f"held-out {_held_out(controller)}; stored {stored:.1f}"
+
+
+def _held_out(controller: ControllerFile) -> str:
+    return ", ".join(
         f"{robot} {test['mean']:.1f} +- {test['standard_error']:.1f} "
         f"({test['crash_rate']:.0%} crash)"
-        for robot, test in tests.items()
-    )
-    return (
-        f"Held-out fitness of {steps}, mean of {starts} fresh starts: {held_out}\n"
-        f"Stored fitness of {steps}, what evolution believes: {scores['stored']:.1f}"
+        for robot, test in controller.scores["held_out"].items()
     )
 
 

@@ -1,11 +1,9 @@
 """Evolve a controller: `python -m evolution.run [EXPERIMENT] [options]`."""
 
 import argparse
-import signal
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -14,27 +12,21 @@ import tyro
 
 from epuck_mj.command_line import command, main, parse
 from epuck_mj.errors import UserError
-from epuck_mj.files import writing
-from epuck_mj.model import Scene, absolute
+from epuck_mj.model import absolute
 from evolution.config import (
     DEFAULT_EXPERIMENT,
     ExperimentConfig,
     find_config,
     load_config,
 )
-from evolution.experiment import Experiment
+from evolution.execution import Means, Run
+from evolution.interruption import Interrupted, interruptible
 from evolution.progress import Progress
-from evolution.provenance import provenance
-from evolution.results import reported_scenes, summary, write_results
+from evolution.results import summary
 from evolution.run_directory import RunDirectory
 
 MODULE = "evolution.run"
 THREADS_MAX = 1024
-
-SAVE_INTERVAL = 1.0
-"""Least time between two checkpoints [s]: a generation can be shorter than a save."""
-
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 @dataclass(frozen=True)
@@ -90,23 +82,20 @@ def run(argv: Sequence[str]) -> int:
         default = Path("runs") / f"{stem}-seed-{options.config.seed}"
         directory = RunDirectory(options.output or default)
         directory.refuse_if_used()
-    experiment = Experiment(
-        options.config, options.engine, options.threads, options.racing
-    )
-    # found out now, not after the evolution
-    scenes = reported_scenes(experiment)
-    source = provenance(experiment.scene, argv, options.engine, options.threads)
-    if options.resume is not None:
-        differing = directory.restore(experiment, source)
-        if differing:
-            print(
-                f"warning: {', '.join(differing)} differ from where this run began "
-                f"(see {directory.provenance}): its last bits may, too",
-                file=sys.stderr,
-            )
-    else:
-        directory.create(options.config, source)
-    return _carry_out(experiment, scenes, directory, options.threads)
+    means = Means(options.engine, options.threads, options.racing)
+    evolution = Run(options.config, directory, means, argv)
+    with directory.locked():
+        if options.resume is not None:
+            differing = evolution.resume()
+            if differing:
+                print(
+                    f"warning: {', '.join(differing)} differ from where this run began "
+                    f"(see {directory.provenance}): its last bits may, too",
+                    file=sys.stderr,
+                )
+        else:
+            evolution.start()
+        return _carry_out(evolution)
 
 
 def _options(argv: Sequence[str]) -> Options:
@@ -139,30 +128,25 @@ def _options(argv: Sequence[str]) -> Options:
     return options
 
 
-def _carry_out(
-    experiment: Experiment,
-    scenes: Mapping[str, Scene],
-    directory: RunDirectory,
-    threads: int,
-) -> int:
+def _carry_out(evolution: Run) -> int:
     """Evolve, then choose and show the champion; the exit status."""
+    experiment, directory = evolution.experiment, evolution.directory
     started = time.monotonic()
     try:
-        with _interruptible():
-            _evolve(experiment, directory)
+        with interruptible():
+            budget = experiment.config.evaluations
+            with Progress(budget, experiment.evaluations) as progress:
+                for record in evolution.evolve():
+                    progress.update(record)
             print("Choosing the champion on fresh starts ...", file=sys.stderr)
-            with writing(directory.path):
-                controller = write_results(experiment, scenes, directory, threads)
-            directory.mark_finished()
-    except _Interrupted as interruption:
-        for signum in SIGNALS:
-            signal.signal(signum, signal.SIG_IGN)
+            controller = evolution.finish()
+    except Interrupted as interruption:
         print(
             f"Interrupted after {directory.evaluations():,} evaluations; go on with: "
             + command(MODULE, "--resume", directory.path),
             file=sys.stderr,
         )
-        return 128 + interruption.signum
+        return interruption.status
     minutes, seconds = divmod(round(time.monotonic() - started), 60)
     print(
         f"{experiment.optimizer.name}, seed {experiment.config.seed}: "
@@ -173,50 +157,6 @@ def _carry_out(
     print(f"Written to {directory.path}: {directory.contents()}")
     print(_replay(directory))
     return 0
-
-
-def _evolve(experiment: Experiment, directory: RunDirectory) -> None:
-    """Go through the generations that are left, saving on the way."""
-    with Progress(experiment.config.evaluations, experiment.evaluations) as progress:
-        saved = before = time.monotonic()
-        seconds = []
-        for record in experiment.run():
-            after = time.monotonic()
-            seconds.append(after - before)
-            before = after
-            if after - saved > SAVE_INTERVAL or experiment.finished:
-                directory.save(experiment, seconds)
-                saved, seconds = after, []
-            progress.update(record)
-
-
-class _Interrupted(BaseException):
-    """Ctrl-C or SIGTERM; what is on disk can be resumed at any moment."""
-
-    def __init__(self, signum: int):
-        super().__init__(signum)
-        self.signum = signum
-
-
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """Turn SIGINT and SIGTERM into `_Interrupted`."""
-
-    def interrupt(signum: int, frame: object) -> None:
-        raise _Interrupted(signum)
-
-    previous = {signum: signal.signal(signum, interrupt) for signum in SIGNALS}
-    interrupted = False
-    try:
-        yield
-    except _Interrupted:
-        # a second one must not break what is being put in order
-        interrupted = True
-        raise
-    finally:
-        if not interrupted:
-            for signum, handler in previous.items():
-                signal.signal(signum, handler)
 
 
 def _replay(directory: RunDirectory) -> str:

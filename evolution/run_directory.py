@@ -1,17 +1,21 @@
 """The run directory: what a run leaves behind, and what it can be resumed from."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-import yaml
+from filelock import FileLock, Timeout
 
 from epuck_mj import files
 from epuck_mj.errors import UserError
-from evolution.config import ExperimentConfig, load_config
+from evolution.config import ExperimentConfig, differing_keys, load_config
 from evolution.experiment import Experiment
 from evolution.provenance import now, to_json
+
+LOCK = ".lock"
+"""File that the process which works in a directory holds."""
 
 
 class RunDirectory:
@@ -30,6 +34,34 @@ class RunDirectory:
         self.trajectory = path / "trajectory.npz"
         self.trajectory_figure = path / "trajectory.png"
         self.recording = path / "champion.rrd"
+
+    @contextmanager
+    def locked(self, patience: float = 0.0) -> Iterator[None]:
+        """Keep every other process out for the time of the block.
+
+        Args:
+            patience: how long to wait for one that is there [s].
+
+        Raises:
+            UserError: if one is there all that time, or the directory cannot be made.
+        """
+        with files.writing(self.path):
+            self.path.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(self.path / LOCK, timeout=patience)
+        try:
+            lock.acquire()
+        except Timeout:
+            raise UserError(
+                f"another process is working in '{self.path}': wait for it, or stop it"
+            ) from None
+        except OSError as error:
+            raise UserError(
+                f"cannot write output '{self.path}': {error.strerror}"
+            ) from None
+        try:
+            yield
+        finally:
+            lock.release()
 
     def refuse_if_used(self) -> None:
         """Refuse a directory that holds anything.
@@ -80,13 +112,7 @@ class RunDirectory:
         Raises:
             UserError: naming the keys that differ.
         """
-        stored = _flat(self.stored_config())
-        asked = _flat(config)
-        differing = [
-            f"{key} (stored {stored.get(key)}, got {asked.get(key)})"
-            for key in dict.fromkeys([*stored, *asked])
-            if stored.get(key) != asked.get(key)
-        ]
+        differing = differing_keys(self.stored_config(), config)
         if differing:
             raise UserError(
                 f"cannot resume '{self.path}' with another config; these keys differ: "
@@ -187,8 +213,8 @@ class RunDirectory:
 
     def _names(self) -> list[str]:
         """What is there, but for what a killed writer left behind."""
-        leftovers = set(files.leftovers(self.path))
-        return sorted(p.name for p in self.path.iterdir() if p not in leftovers)
+        aside = {*files.leftovers(self.path), self.path / LOCK}
+        return sorted(p.name for p in self.path.iterdir() if p not in aside)
 
     def _stored_provenance(self) -> dict:
         """What is known of the run's beginning; empty if it was killed before.
@@ -207,10 +233,3 @@ class RunDirectory:
         except (OSError, ValueError) as error:
             raise UserError(f"cannot read '{self.provenance}': {error}") from None
         return fields
-
-
-def _flat(config: ExperimentConfig) -> dict:
-    """Keys and values, the optimiser's as `optimizer.<key>`."""
-    fields = yaml.safe_load(config.to_yaml())
-    optimizer = fields.pop("optimizer")
-    return fields | {f"optimizer.{key}": value for key, value in optimizer.items()}

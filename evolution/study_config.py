@@ -1,0 +1,178 @@
+"""What a study is: experiments that are run with the same seeds and compared."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Self
+
+import yaml
+
+from epuck_mj.errors import UserError
+from epuck_mj.files import is_file
+from epuck_mj.model import absolute
+from evolution.config import (
+    CONFIGS,
+    ExperimentConfig,
+    differing_keys,
+    find_config,
+    load_config,
+    read_mapping,
+)
+
+KEYS = ("experiments", "common")
+
+
+@dataclass(frozen=True)
+class StudyConfig:
+    """Experiments by name, in the order of every table and figure.
+
+    Attributes:
+        experiments: the config of each, whose seed is not used.
+    """
+
+    experiments: Mapping[str, ExperimentConfig]
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Read a study: `experiments`, a list, and `common`, keys that all share.
+
+        Each experiment is a shipped one or a YAML file; what `common` says wins.
+
+        Raises:
+            UserError: if a file is missing or says something unknown.
+        """
+        content = read_mapping(path)
+        unknown = [key for key in content if key not in KEYS]
+        if unknown:
+            raise UserError(
+                f"'{path}': unknown key '{unknown[0]}'; available: {', '.join(KEYS)}"
+            )
+        names, common = content.get("experiments"), content.get("common") or {}
+        if not isinstance(names, list) or not names:
+            raise UserError(
+                f"'{path}': expected 'experiments', a list of experiments, got {names}"
+            )
+        if not isinstance(common, dict):
+            raise UserError(f"'{path}': expected 'common', a mapping, got {common}")
+        experiments: dict[str, ExperimentConfig] = {}
+        for name in map(str, names):
+            file = find_config(name)
+            if file.stem in experiments:
+                raise UserError(f"'{path}': two experiments are called '{file.stem}'")
+            fields = load_config(file).model_dump() | common
+            config = ExperimentConfig.parsed(fields, f"'{path}', common")
+            experiments[file.stem] = _located(config)
+        return cls(MappingProxyType(experiments))
+
+    def only(self, names: list[str]) -> Self:
+        """The experiments of those names.
+
+        Raises:
+            UserError: if one is not in the study.
+        """
+        for name in names:
+            if name not in self.experiments:
+                raise UserError(
+                    f"no experiment '{name}' in the study; available: "
+                    + ", ".join(self.experiments)
+                )
+        chosen = {name: self.experiments[name] for name in names}
+        return type(self)(MappingProxyType(chosen))
+
+    def with_seed(self, name: str, seed: int) -> ExperimentConfig:
+        """The config of one run."""
+        return self.experiments[name].model_copy(update={"seed": seed})
+
+    def merged(self, other: Self, path: Path) -> Self:
+        """This study, as it is stored at `path`, and the experiments of another.
+
+        Raises:
+            UserError: naming the keys in which an experiment of both differs.
+        """
+        for name, config in other.experiments.items():
+            if name not in self.experiments:
+                continue
+            differing = differing_keys(self.experiments[name], config)
+            if differing:
+                raise UserError(
+                    f"'{path}' is a study of another config; experiment '{name}' "
+                    f"differs in: {', '.join(differing)}"
+                )
+        return type(self)(MappingProxyType({**self.experiments, **other.experiments}))
+
+    def to_yaml(self) -> str:
+        """All experiments with all their keys, as `from_yaml` reads them."""
+        fields = {name: c.model_dump() for name, c in self.experiments.items()}
+        return yaml.safe_dump(fields, sort_keys=False)
+
+    @classmethod
+    def from_yaml(cls, path: Path) -> Self:
+        """What `to_yaml` wrote to a file.
+
+        Raises:
+            UserError: if it is not there, or damaged.
+        """
+        experiments = {
+            str(name): ExperimentConfig.parsed(fields, f"'{path}', {name}")
+            for name, fields in read_mapping(path).items()
+        }
+        if not experiments:
+            raise UserError(f"'{path}': expected experiments, got none")
+        return cls(MappingProxyType(experiments))
+
+
+def _located(config: ExperimentConfig) -> ExperimentConfig:
+    """The config with paths that mean the same from anywhere."""
+    paths: dict[str, Any] = {
+        "robot": absolute(config.robot),
+        "arena": absolute(config.arena),
+    }
+    return config.model_copy(update=paths)
+
+
+def find_study(study: str) -> Path:
+    """The file of a shipped study, or the user's own.
+
+    Raises:
+        UserError: if there is none.
+    """
+    shipped = {
+        path.stem: path
+        for path in sorted(CONFIGS.glob("*.yaml"))
+        if "experiments" in read_mapping(path)
+    }
+    path = shipped.get(study, Path(study))
+    if is_file(path):
+        return path
+    raise UserError(
+        f"no study '{study}': expected the path of a YAML file or one of "
+        + ", ".join(shipped)
+    )
+
+
+def parse_seeds(text: str) -> list[int]:
+    """Seeds of `1-30` or `1,3,5-8`, in ascending order.
+
+    Raises:
+        UserError: if it says anything else, or names a seed twice.
+    """
+    seeds: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        ends = [first, last] if dash else [first]
+        if not all(end.isascii() and end.isdigit() for end in ends):
+            raise UserError(f"expected seeds as 1-30 or 1,3,5-8, got '{text}'")
+        low, high = int(ends[0]), int(ends[-1])
+        if not low <= high < low + SEEDS_MAX:
+            raise UserError(
+                f"expected seeds from a lower to a higher one, at most {SEEDS_MAX}, "
+                f"got '{part}'"
+            )
+        seeds += range(low, high + 1)
+    if len(set(seeds)) < len(seeds):
+        raise UserError(f"expected every seed once, got '{text}'")
+    return sorted(seeds)
+
+
+SEEDS_MAX = 10_000
