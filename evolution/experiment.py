@@ -61,7 +61,7 @@ class Record:
 ARRAYS = {"records": len(Record.__dataclass_fields__), "best_genomes": None}
 """Arrays of a state, one row per generation, and their columns (None: genes)."""
 
-HISTORY = ("generation", "evaluations", "best", "mean", "std")
+HISTORY: tuple[str, ...] = ("generation", "evaluations", "best", "mean", "std")
 """Columns of history.csv: racing changes none of them."""
 
 

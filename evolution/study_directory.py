@@ -17,6 +17,7 @@ class StudyDirectory:
         """Name the directory; nothing is touched yet."""
         self.path = path
         self.config = path / "study.yaml"
+        self.yardstick = path / "wall-follower.json"
 
     def run(self, name: str, seed: int) -> RunDirectory:
         """The directory of one run."""
