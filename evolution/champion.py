@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from epuck_mj.controller import Network
 from epuck_mj.starts import FreeSpace
 from evolution.evaluation import Engine, evaluate
 from evolution.experiment import Experiment, Purpose, random_generator
@@ -33,9 +32,9 @@ def starts_for_validation(space: FreeSpace) -> np.ndarray:
     return space.sample(rng, N_VALIDATION)
 
 
-def starts_for_test(space: FreeSpace) -> np.ndarray:
-    """The starts on which champions are reported, `(1000, 3)`."""
-    return space.sample(random_generator(HELD_OUT_SEED, Purpose.TEST), N_TEST)
+def starts_for_test(space: FreeSpace, n: int = N_TEST) -> np.ndarray:
+    """The first `n` of the starts on which champions are reported, `(n, 3)`."""
+    return space.sample(random_generator(HELD_OUT_SEED, Purpose.TEST), n)
 
 
 @dataclass(frozen=True)
@@ -80,34 +79,3 @@ def choose_champion(engine: Engine, experiment: Experiment) -> Champion:
     fitness = evaluate(engine, network, genomes, starts).fitness
     best = int(fitness.argmax())
     return Champion(genomes[best], float(stored[best]), float(fitness[best]))
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """A champion on the test starts.
-
-    Attributes:
-        mean: fitness over the starts.
-        standard_error: of that mean.
-        crash_rate: share of the trials that ended in a crash.
-        starts: how many there were.
-    """
-
-    mean: float
-    standard_error: float
-    crash_rate: float
-    starts: int
-
-
-def held_out(
-    engine: Engine, network: Network, genome: np.ndarray, starts: np.ndarray
-) -> HeldOut:
-    """What fresh starts `(n, 3)` say of a genome `(genes,)`."""
-    evaluation = evaluate(engine, network, genome[None], starts)
-    fitness = evaluation.trial_fitness[0]
-    return HeldOut(
-        mean=float(fitness.mean()),
-        standard_error=float(fitness.std(ddof=1) / np.sqrt(fitness.size)),
-        crash_rate=float(evaluation.crashed.mean()),
-        starts=fitness.size,
-    )

@@ -7,13 +7,12 @@ from typing import Annotated, Any, Literal, Self
 import yaml
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
-    Discriminator,
     Field,
     StrictBool,
     StrictFloat,
     StrictInt,
-    Tag,
     ValidationError,
 )
 
@@ -24,34 +23,34 @@ from epuck_mj.errors import UserError
 from epuck_mj.files import is_file
 from epuck_mj.motors import Speeds
 from epuck_mj.tasks import START_CLEARANCE
-from evolution.optimizer import (
-    DifferentialEvolutionParameters,
-    GeneticAlgorithmParameters,
-    SearchSpace,
-)
+from evolution.optimizer import ALGORITHMS, OptimizerParameters, SearchSpace
 
 CONFIGS = Path(__file__).resolve().parent / "configs"
 DEFAULT_EXPERIMENT = "de-best"
 
 
-def _algorithm(value: Any) -> Any:
-    """The tag that says which optimiser's parameters `value` holds."""
+def _of_known_algorithm(value: Any) -> Any:
+    """`value`, which says whose parameters it holds.
+
+    Raises:
+        ValueError: if it does not.
+    """
     if isinstance(value, dict):
-        return value.get("algorithm")
-    return getattr(value, "algorithm", None)
+        algorithm = value.get("algorithm")
+    else:
+        algorithm = getattr(value, "algorithm", None)
+    # a list, which `in` cannot look up in a mapping, is no algorithm either
+    if algorithm not in list(ALGORITHMS):
+        raise ValueError(
+            f"expected a mapping with 'algorithm', one of {', '.join(ALGORITHMS)}"
+        )
+    return value
 
 
 OptimizerConfig = Annotated[
-    Annotated[DifferentialEvolutionParameters, Tag("differential_evolution")]
-    | Annotated[GeneticAlgorithmParameters, Tag("genetic_algorithm")],
-    Discriminator(
-        _algorithm,
-        custom_error_type="unknown_algorithm",
-        custom_error_message=(
-            "expected a mapping with 'algorithm', one of differential_evolution, "
-            "genetic_algorithm"
-        ),
-    ),
+    OptimizerParameters,
+    Field(discriminator="algorithm"),
+    BeforeValidator(_of_known_algorithm),
 ]
 
 
@@ -222,7 +221,7 @@ def one_line(error: ValidationError) -> str:
     """Everything a config got wrong, with the keys there are when one is unknown."""
     parts = []
     for detail in error.errors():
-        key = ".".join(str(part) for part in detail["loc"] if part not in _TAGS)
+        key = ".".join(str(part) for part in detail["loc"] if part not in ALGORITHMS)
         if detail["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
             available = ", ".join(_keys(detail["loc"]))
             parts.append(f"unknown key '{key}'; available: {available}")
@@ -234,18 +233,11 @@ def one_line(error: ValidationError) -> str:
     return "; ".join(parts)
 
 
-_TAGS = ("differential_evolution", "genetic_algorithm")
-
-
 def _keys(loc: tuple[int | str, ...]) -> list[str]:
     """The keys that could stand where the unknown key at `loc` stands."""
     if len(loc) == 1:
         return list(ExperimentConfig.model_fields)
-    kinds = {
-        "differential_evolution": DifferentialEvolutionParameters,
-        "genetic_algorithm": GeneticAlgorithmParameters,
-    }
-    return [field.name for field in fields(kinds[str(loc[1])])]
+    return [field.name for field in fields(ALGORITHMS[str(loc[1])])]
 
 
 def _shown(value: Any) -> str:

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from epuck_mj.controller import ControllerFile
 from epuck_mj.files import writing
 from evolution.config import ExperimentConfig
+from evolution.evaluation import Engine
 from evolution.experiment import Experiment, Record
 from evolution.provenance import provenance
-from evolution.results import reported_scenes, write_results
+from evolution.results import judges, write_results
 from evolution.run_directory import RunDirectory
 
 SAVING_SHARE = 0.05
@@ -25,12 +26,13 @@ class Means:
     """How a run is carried out, which changes none of its results.
 
     Attributes:
-        engine: one of `evolution.experiment.ENGINES`.
+        engine: one of `evolution.experiment.ENGINES`, or an engine whose `str` is what
+            the provenance calls it.
         threads: that step the robots; 0 is one per core.
         racing: break off individuals that can only lose.
     """
 
-    engine: str = "batch"
+    engine: str | Engine = "batch"
     threads: int = 0
     racing: bool = True
 
@@ -59,9 +61,9 @@ class Run:
         self.experiment = Experiment(config, means.engine, means.threads, means.racing)
         self.directory = directory
         # found out now, not after the evolution
-        self._scenes = reported_scenes(self.experiment)
+        self._judges = judges(self.experiment, means.threads)
         self._provenance = provenance(
-            self.experiment.scene, argv, means.engine, means.threads
+            self.experiment.scene, argv, str(means.engine), means.threads
         )
         self._threads = means.threads
 
@@ -106,7 +108,7 @@ class Run:
         """
         with writing(self.directory.path):
             controller = write_results(
-                self.experiment, self._scenes, self.directory, self._threads
+                self.experiment, self._judges, self.directory, self._threads
             )
         self.directory.mark_finished()
         return controller

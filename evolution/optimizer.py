@@ -1,7 +1,8 @@
 """The ask/tell protocol of an optimiser and the table of those that are shipped.
 
-The three modules behind it do not know this one: `ask_tell` has the shared rules,
-`differential_evolution` and `genetic_algorithm` the algorithms.
+The modules behind it do not know this one: `ask_tell` has the shared rules, one module
+each the algorithms. The baselines beside the paper's are random search, (1+1)-ES and
+CMA-ES.
 
     optimizer = make_optimizer(default_parameters("de-best"), space, rng)
     while spent + optimizer.next_size() <= budget:
@@ -10,21 +11,25 @@ The three modules behind it do not know this one: `ask_tell` has the shared rule
         spent += len(genomes)
 """
 
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike
 
 from evolution.ask_tell import AskTellError, SearchSpace
+from evolution.cma_es import CmaEs, CmaEsParameters
 from evolution.differential_evolution import (
     DifferentialEvolution,
     DifferentialEvolutionParameters,
 )
+from evolution.evolution_strategy import EvolutionStrategy, EvolutionStrategyParameters
 from evolution.genetic_algorithm import GeneticAlgorithm, GeneticAlgorithmParameters
+from evolution.random_search import RandomSearch, RandomSearchParameters
 
 __all__ = [
+    "ALGORITHMS",
     "OPTIMIZERS",
     "AskTellError",
     "Optimizer",
@@ -41,7 +46,7 @@ class Optimizer(Protocol):
     Attributes:
         name: its name in `OPTIMIZERS`.
         population: genomes `(population, genes)` after the last tell, read-only; before
-            the first tell the initial ones.
+            the first tell the initial ones. As many as there are: it may grow.
         fitness: their stored fitness `(population,)`, read-only; -inf before the first
             tell.
         generation: number of tells so far.
@@ -105,9 +110,31 @@ class Optimizer(Protocol):
         ...
 
 
-OptimizerParameters = DifferentialEvolutionParameters | GeneticAlgorithmParameters
+OptimizerParameters = (
+    DifferentialEvolutionParameters
+    | GeneticAlgorithmParameters
+    | RandomSearchParameters
+    | EvolutionStrategyParameters
+    | CmaEsParameters
+)
 
-# The paper's three (section 4); what it leaves open is at the project's defaults.
+Maker = Callable[[Any, SearchSpace, Generator], Optimizer]
+# (parameters of that kind, space, rng) -> optimiser
+MAKERS: Mapping[type[OptimizerParameters], Maker] = {
+    DifferentialEvolutionParameters: DifferentialEvolution,
+    GeneticAlgorithmParameters: GeneticAlgorithm,
+    RandomSearchParameters: RandomSearch,
+    EvolutionStrategyParameters: EvolutionStrategy,
+    CmaEsParameters: CmaEs,
+}
+
+ALGORITHMS: Mapping[str, type[OptimizerParameters]] = {
+    kind.algorithm: kind for kind in MAKERS
+}
+"""The kinds of parameters by what configurations call their `algorithm`."""
+
+# The paper's three (section 4), what it leaves open at the project's defaults; then the
+# baselines at theirs.
 OPTIMIZERS: Mapping[str, OptimizerParameters] = {
     "de-best": DifferentialEvolutionParameters(
         strategy="best", population=150, scale=0.8, crossover=1.0
@@ -116,11 +143,14 @@ OPTIMIZERS: Mapping[str, OptimizerParameters] = {
         strategy="rand", population=120, scale=0.7, crossover=1.0
     ),
     "ga": GeneticAlgorithmParameters(),
+    "random-search": RandomSearchParameters(),
+    "one-plus-one-es": EvolutionStrategyParameters(),
+    "cma-es": CmaEsParameters(),
 }
 
 
 def default_parameters(name: str) -> OptimizerParameters:
-    """The parameters of the paper for the optimiser called `name`.
+    """The parameters of the optimiser called `name`, the paper's if it is there.
 
     Raises:
         ValueError: no such optimiser.
@@ -145,6 +175,4 @@ def make_optimizer(
     Raises:
         ValueError: the optimiser cannot search this space.
     """
-    if isinstance(parameters, DifferentialEvolutionParameters):
-        return DifferentialEvolution(parameters, space, rng)
-    return GeneticAlgorithm(parameters, space, rng)
+    return MAKERS[type(parameters)](parameters, space, rng)

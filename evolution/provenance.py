@@ -34,7 +34,7 @@ def provenance(
         "git": _git(),
         "mjcf_sha256": dict(scene.sha256),
         "platform": " ".join([platform.system(), *platform.libc_ver()]),
-        "processor": _processor(),
+        "processor": processor(),
         "started": now(),
         "finished": None,
     }
@@ -70,7 +70,7 @@ def _git() -> dict[str, Any] | None:
     return {"commit": commit, "modified": bool(status)}
 
 
-def _processor() -> dict[str, Any]:
+def processor() -> dict[str, Any]:
     """Model name and flags, as far as the system tells."""
     fields: dict[str, Any] = {"machine": platform.machine(), "model": None, "flags": []}
     if sys.platform == "linux":

@@ -10,18 +10,12 @@ from epuck_mj import files
 from epuck_mj.controller import ControllerFile
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.recording import save_recording
-from epuck_mj.starts import FreeSpace
 from epuck_mj.trajectory import record
-from evolution.champion import (
-    Champion,
-    HeldOut,
-    choose_champion,
-    held_out,
-    starts_for_test,
-)
+from evolution.champion import Champion, choose_champion
 from evolution.evaluation import BatchEngine
 from evolution.experiment import Experiment
 from evolution.figures import fitness_figure, save_figure, trajectory_figure
+from evolution.held_out import HeldOut, Judge
 from evolution.run_directory import RunDirectory
 
 WHEELED_ROBOT = "epuck"
@@ -31,22 +25,26 @@ N_SHOWN = 4
 """Trials of the champion in the picture; the first is also the recording."""
 
 
-def reported_scenes(experiment: Experiment) -> dict[str, Scene]:
+def judges(experiment: Experiment, threads: int = 0) -> dict[str, Judge]:
     """The robots that the champion is tested on: its own, and the one on wheels.
 
     Raises:
-        UserError: if the wheeled robot cannot use the arena.
+        UserError: if the wheeled robot cannot use the arena, or nobody can measure it.
     """
     config = experiment.config
     wheeled = load_scene(WHEELED_ROBOT, config.arena, config.control_step)
+    scenes = {Path(config.robot).name: experiment.scene, WHEELED_ROBOT: wheeled}
     if experiment.scene.robot == wheeled.robot:
-        return {WHEELED_ROBOT: wheeled}
-    return {Path(config.robot).name: experiment.scene, WHEELED_ROBOT: wheeled}
+        scenes = {WHEELED_ROBOT: wheeled}
+    return {
+        robot: Judge(scene, config.task, config.start_clearance, threads)
+        for robot, scene in scenes.items()
+    }
 
 
 def write_results(
     experiment: Experiment,
-    scenes: Mapping[str, Scene],
+    judges: Mapping[str, Judge],
     directory: RunDirectory,
     threads: int = 0,
 ) -> ControllerFile:
@@ -54,7 +52,7 @@ def write_results(
 
     Args:
         experiment: a finished run.
-        scenes: robots to test it on, as of `reported_scenes`.
+        judges: robots to test it on, as of `judges`.
         directory: where to write.
         threads: that step the robots; 0 is one per core.
 
@@ -65,24 +63,14 @@ def write_results(
     champion = choose_champion(
         BatchEngine(experiment.scene, config.task, threads), experiment
     )
-    starts = {
-        robot: starts_for_test(FreeSpace(scene, config.start_clearance))
-        for robot, scene in scenes.items()
-    }
-    tests = {
-        robot: held_out(
-            BatchEngine(scene, config.task, threads),
-            config.network,
-            champion.genome,
-            starts[robot],
-        )
-        for robot, scene in scenes.items()
-    }
+    policy = config.network.decode(champion.genome)
+    tests = {robot: judge.test(policy) for robot, judge in judges.items()}
     controller = _controller_file(experiment, champion, tests)
     files.write_text(directory.champion, controller.to_json())
     _draw_fitness(experiment, directory)
-    wheeled = scenes[WHEELED_ROBOT]
-    _show(experiment, directory, controller, wheeled, starts[WHEELED_ROBOT][:N_SHOWN])
+    wheeled = judges[WHEELED_ROBOT]
+    starts = wheeled.starts(N_SHOWN)
+    _show(experiment, directory, controller, wheeled.scene, starts)
     return controller
 
 
@@ -105,8 +93,7 @@ def scores(controller: ControllerFile) -> str:
 
 def _held_out(controller: ControllerFile) -> str:
     return ", ".join(
-        f"{robot} {test['mean']:.1f} +- {test['standard_error']:.1f} "
-        f"({test['crash_rate']:.0%} crash)"
+        f"{robot} {test['mean']:.1f} ({test['crash_rate']:.0%} crash)"
         for robot, test in controller.scores["held_out"].items()
     )
 

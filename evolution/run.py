@@ -34,8 +34,8 @@ class Options:
     """Evolve a controller for the e-puck and test its champion on fresh starts.
 
     Attributes:
-        experiment: a shipped experiment (de-best, de-rand, ga) or a YAML file; it comes
-            first.
+        experiment: a shipped experiment (de-best, de-rand, ga, random-search,
+            one-plus-one-es, cma-es) or a YAML file; it comes first.
         config: the experiment's keys; a flag wins over the YAML.
         output: run directory, runs/<experiment>-seed-<seed> if not given.
         resume: run directory to go on with.

@@ -129,7 +129,7 @@ class RunDirectory:
             UserError: if the checkpoint cannot be read or belongs to something else,
                 or the models have been edited since.
         """
-        first = self._stored_provenance() or provenance
+        first = self.provenance_fields() or provenance
         self._refuse_other_models(first, provenance)
         if self.checkpoint.exists():
             state = files.read_arrays(self.checkpoint)
@@ -199,11 +199,11 @@ class RunDirectory:
     @property
     def finished(self) -> bool:
         """Whether the run has written everything."""
-        return bool(self._stored_provenance().get("finished"))
+        return bool(self.provenance_fields().get("finished"))
 
     def mark_finished(self) -> None:
         """Write down when everything was there."""
-        fields = self._stored_provenance() | {"finished": now()}
+        fields = self.provenance_fields() | {"finished": now()}
         with files.writing(self.path):
             files.write_text(self.provenance, to_json(fields))
 
@@ -216,7 +216,7 @@ class RunDirectory:
         aside = {*files.leftovers(self.path), self.path / LOCK}
         return sorted(p.name for p in self.path.iterdir() if p not in aside)
 
-    def _stored_provenance(self) -> dict:
+    def provenance_fields(self) -> dict:
         """What is known of the run's beginning; empty if it was killed before.
 
         Raises:

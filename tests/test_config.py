@@ -9,14 +9,17 @@ from pydantic import ValidationError
 
 from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
 from epuck_mj.errors import UserError
-from evolution.config import CONFIGS, ExperimentConfig, find_config, load_config
+from evolution.config import (
+    CONFIGS,
+    ExperimentConfig,
+    find_config,
+    load_config,
+    shipped_experiments,
+)
 from evolution.optimizer import OPTIMIZERS
 
-SHIPPED = ("de-best", "de-rand", "ga")
-every_experiment = pytest.mark.parametrize("name", SHIPPED)
-
 # Source: paper, section 4; what it leaves open: paper notes, section 3
-PAPER = {
+PAPERS = {
     "de-best": {
         "algorithm": "differential_evolution",
         "strategy": "best",
@@ -45,6 +48,23 @@ PAPER = {
         "elites": 0,
     },
 }
+BASELINES = {
+    "random-search": {"algorithm": "random_search", "population": 100},
+    "one-plus-one-es": {
+        "algorithm": "evolution_strategy",
+        "lineages": 10,
+        "sigma": 1.0,
+        "bounds_rule": "reflect",
+    },
+    "cma-es": {
+        "algorithm": "cma_es",
+        "population": 15,
+        "sigma": 2.0,
+        "restarts": True,
+    },
+}
+SHIPPED = PAPERS | BASELINES
+every_experiment = pytest.mark.parametrize("name", SHIPPED)
 COMMON = {
     "seed": 1,
     "evaluations": 30_000,
@@ -89,6 +109,10 @@ def refusal(path: Path) -> str:
     return message
 
 
+EVERY_ALGORITHM = (
+    "expected a mapping with 'algorithm', one of differential_evolution, "
+    "genetic_algorithm, random_search, evolution_strategy, cma_es"
+)
 GA = {"algorithm": "genetic_algorithm"}
 DE = {
     "algorithm": "differential_evolution",
@@ -99,14 +123,14 @@ DE = {
 }
 
 
-def test_exactly_the_three_experiments_are_shipped():
-    assert sorted(path.stem for path in CONFIGS.iterdir()) == list(SHIPPED)
+def test_exactly_these_experiments_are_shipped():
+    assert list(shipped_experiments()) == sorted(SHIPPED)
 
 
 @every_experiment
-def test_a_shipped_experiment_is_the_papers(name):
+def test_a_shipped_experiment_is_the_papers_or_a_baseline_beside_it(name):
     config = load_config(find_config(name))
-    assert config.model_dump() == {**COMMON, "optimizer": PAPER[name]}
+    assert config.model_dump() == {**COMMON, "optimizer": SHIPPED[name]}
 
 
 @every_experiment
@@ -184,12 +208,12 @@ def test_yaml_round_trip(name, config_file):
 def test_yaml_holds_every_key_in_the_configs_order(name):
     fields = yaml.safe_load(load_config(find_config(name)).to_yaml())
     assert list(fields) == list(ExperimentConfig.model_fields)
-    assert set(fields["optimizer"]) == set(PAPER[name])
+    assert set(fields["optimizer"]) == set(SHIPPED[name])
 
 
 def test_an_experiment_needs_no_more_than_its_optimizer(config_file):
     config = load_config(config_file({"optimizer": GA}))
-    assert config.model_dump() == {**COMMON, "optimizer": PAPER["ga"]}
+    assert config.model_dump() == {**COMMON, "optimizer": PAPERS["ga"]}
 
 
 def test_unknown_key_is_refused_with_the_available_ones(config_file):
@@ -199,15 +223,23 @@ def test_unknown_key_is_refused_with_the_available_ones(config_file):
     assert available == list(ExperimentConfig.model_fields)
 
 
-@pytest.mark.parametrize("optimizer", [GA, DE], ids=["ga", "de"])
+@pytest.mark.parametrize(
+    "optimizer",
+    [GA, DE, *BASELINES.values()],
+    ids=["ga", "de", *BASELINES],
+)
 def test_unknown_optimizer_key_is_refused_with_the_available_ones(
     optimizer, config_file
 ):
     message = refusal(config_file({"optimizer": {**optimizer, "tornament": 3}}))
     assert "unknown key 'optimizer.tornament'" in message
     available = message.partition("available: ")[2].split(", ")
-    known = PAPER["ga"] if optimizer is GA else PAPER["de-best"]
-    assert set(available) == set(known)
+    (known,) = {
+        tuple(sorted(keys))
+        for keys in SHIPPED.values()
+        if keys["algorithm"] == optimizer["algorithm"]
+    }
+    assert sorted(available) == list(known)
 
 
 def test_a_key_of_the_other_optimizer_is_unknown(config_file):
@@ -257,9 +289,15 @@ def test_a_wrong_value_is_refused_by_name_and_shown(key, value, config_file):
         ({**DE, "bounds_rule": "wrap"}, ("unknown bounds rule", "midpoint")),
         ({**DE, "scale": float("nan")}, ("scale (F): expected 0 to 2", "nan")),
         ({**DE, "reevaluate_parents": "x"}, ("optimizer.reevaluate_parents: ",)),
-        ({"algorithm": "cma"}, ("differential_evolution, genetic_algorithm", "cma")),
-        ({"bits": 8}, ("differential_evolution, genetic_algorithm",)),
-        ("ga", ("differential_evolution, genetic_algorithm", "'ga'")),
+        ({"algorithm": "random_search", "population": 0}, ("at least 1", "got 0")),
+        ({"algorithm": "evolution_strategy", "sigma": 0.0}, ("a number above 0",)),
+        ({"algorithm": "cma_es", "population": 3}, ("at least 4", "got 3")),
+        ({"algorithm": "cma_es", "restarts": "x"}, ("optimizer.restarts: ", "'x'")),
+        ({"algorithm": "cma"}, (EVERY_ALGORITHM, "cma")),
+        ({"algorithm": ["cma_es"]}, (EVERY_ALGORITHM, "['cma_es']")),
+        ({"bits": 8}, (EVERY_ALGORITHM,)),
+        ("ga", (EVERY_ALGORITHM, "'ga'")),
+        (None, (EVERY_ALGORITHM, "None")),
         ({"algorithm": "differential_evolution"}, ("'optimizer.strategy' is missing",)),
     ],
 )
@@ -309,7 +347,8 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path):
 
 def test_unknown_experiment_is_refused_with_the_shipped_ones(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(UserError, match=r"no experiment 'de'.*de-best, de-rand, ga$"):
+    available = ", ".join(sorted(SHIPPED))
+    with pytest.raises(UserError, match=rf"no experiment 'de'.* one of {available}$"):
         find_config("de")
     with pytest.raises(UserError, match="no experiment"):
         find_config(".")
@@ -326,13 +365,15 @@ def test_frozen(name):
     with pytest.raises(ValidationError, match="frozen"):
         config.seed = 3  # pyright: ignore[reportAttributeAccessIssue]
     with pytest.raises(FrozenInstanceError):
-        config.optimizer.population = 3  # pyright: ignore[reportAttributeAccessIssue]
-    # what a changed copy is made with leaves the original alone
+        config.optimizer.algorithm = "x"  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_a_changed_copy_leaves_the_original_alone():
+    config = load_config(find_config("ga"))
     changed = config.model_copy(
         update={"optimizer": replace(config.optimizer, population=9)}
     )
-    assert changed.optimizer.population == 9
-    assert config.optimizer.population == PAPER[name]["population"]
+    assert changed.optimizer != config.optimizer == OPTIMIZERS["ga"]
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,9 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from evolution.evolution_strategy import EvolutionStrategyParameters
 from evolution.optimizer import (
+    ALGORITHMS,
     OPTIMIZERS,
     AskTellError,
     Optimizer,
@@ -16,9 +18,12 @@ from evolution.optimizer import (
 )
 
 CUBE = SearchSpace(genes=3, lower=-5, upper=5, init_lower=-5, init_upper=5)
-LOPSIDED = SearchSpace(genes=3, lower=-0.1, upper=0.3, init_lower=-0.1, init_upper=0.3)
+LOPSIDED = SearchSpace(genes=3, lower=-0.5, upper=1.5, init_lower=-0.5, init_upper=1.5)
 
-BEST, RAND, GA = (OPTIMIZERS[name] for name in ("de-best", "de-rand", "ga"))
+PAPERS = ("de-best", "de-rand", "ga")
+BASELINES = ("random-search", "one-plus-one-es", "cma-es")
+BEST, RAND, GA = (OPTIMIZERS[name] for name in PAPERS)
+RANDOM, ES, CMA = (OPTIMIZERS[name] for name in BASELINES)
 VARIANTS = {
     **OPTIMIZERS,
     "de-best reevaluated": replace(BEST, reevaluate_parents=True),
@@ -27,6 +32,9 @@ VARIANTS = {
     "de-rand reflect": replace(RAND, bounds_rule="reflect", scale=2.0),
     "ga odd, elites": replace(GA, population=31, elites=2),
     "ga 32 bits": replace(GA, bits=32),
+    "random-search small": replace(RANDOM, population=7),
+    "one-plus-one-es reinit": replace(ES, bounds_rule="reinit", sigma=2.0),
+    "cma-es without restarts": replace(CMA, restarts=False, population=20),
 }
 every_variant = pytest.mark.parametrize("variant", VARIANTS)
 
@@ -37,6 +45,18 @@ def make(variant: str, seed: int = 0, space: SearchSpace = CUBE) -> Optimizer:
 
 def sphere(genomes: np.ndarray) -> np.ndarray:
     return -np.sum(genomes**2, axis=-1)
+
+
+def n_individuals(variant: str) -> int:
+    parameters = VARIANTS[variant]
+    if isinstance(parameters, EvolutionStrategyParameters):
+        return parameters.lineages
+    return parameters.population
+
+
+def found(variant: str) -> float:
+    """What the sphere's best must exceed after 60 generations: search or luck."""
+    return {"random-search": -1.0, "random-search small": -5.0}.get(variant, -0.1)
 
 
 def evolve(optimizer: Optimizer, n_generations: int, fitness=sphere) -> Optimizer:
@@ -67,8 +87,20 @@ def saved_and_loaded(state: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def test_shipped_names_are_the_optimisers_own():
-    assert list(OPTIMIZERS) == ["de-best", "de-rand", "ga"]
+    assert list(OPTIMIZERS) == [*PAPERS, *BASELINES]
     assert all(make(name).name == name for name in OPTIMIZERS)
+
+
+def test_algorithms_are_the_kinds_of_parameters_by_their_tags():
+    assert list(ALGORITHMS) == [
+        "differential_evolution",
+        "genetic_algorithm",
+        "random_search",
+        "evolution_strategy",
+        "cma_es",
+    ]
+    for parameters in OPTIMIZERS.values():
+        assert ALGORITHMS[parameters.algorithm] is type(parameters)
 
 
 def test_shipped_parameters_are_the_papers():
@@ -92,7 +124,10 @@ def test_shipped_parameters_are_the_papers():
 
 
 def test_unknown_name_lists_what_is_available():
-    message = "^unknown optimiser 'de'; available: de-best, de-rand, ga$"
+    message = (
+        "^unknown optimiser 'de'; available: de-best, de-rand, ga, "
+        "random-search, one-plus-one-es, cma-es$"
+    )
     with pytest.raises(ValueError, match=message):
         default_parameters("de")
 
@@ -131,6 +166,30 @@ def test_genetic_algorithm_solves_the_sphere_to_its_grid(name):
     assert np.abs(best).max() <= 1.5 * 10 / 255 + 1e-12
 
 
+@pytest.mark.parametrize("name", ["one-plus-one-es", "one-plus-one-es reinit"])
+def test_evolution_strategies_solve_the_sphere(name):
+    optimizer = evolve(make(name), 400)
+    # Each of them: they are independent.
+    assert optimizer.fitness.min() > -1e-6
+
+
+@pytest.mark.parametrize("name", ["cma-es", "cma-es without restarts"])
+def test_cma_es_solves_the_sphere(name):
+    assert evolve(make(name), 60).fitness.max() > -1e-6
+
+
+@pytest.mark.parametrize("name", ["random-search", "random-search small"])
+def test_random_search_only_improves(name):
+    optimizer = evolve(make(name), 1)
+    for _ in range(30):
+        before = np.sort(optimizer.fitness)
+        evolve(optimizer, 1)
+        assert np.all(np.sort(optimizer.fitness) >= before)
+    assert (
+        np.sort(optimizer.fitness).sum() > np.sort(evolve(make(name), 1).fitness).sum()
+    )
+
+
 @every_variant
 @pytest.mark.parametrize("space", [CUBE, LOPSIDED], ids=["cube", "lopsided"])
 def test_bounds_are_obeyed_even_where_the_best_is_a_corner(variant, space):
@@ -144,15 +203,16 @@ def test_bounds_are_obeyed_even_where_the_best_is_a_corner(variant, space):
 
 @every_variant
 def test_first_genomes_fill_the_initial_range(variant):
-    genomes = make(variant).ask()
-    assert genomes.min() < -4.5
-    assert genomes.max() > 4.5
+    # Of several seeds, since ten individuals may miss an end.
+    genomes = np.concatenate([make(variant, seed).ask() for seed in range(10)])
+    assert np.all(genomes.min(axis=0) < -4.5)
+    assert np.all(genomes.max(axis=0) > 4.5)
 
 
 @every_variant
 def test_shapes_counts_and_sizes(variant):
     optimizer = make(variant)
-    population = VARIANTS[variant].population
+    population = n_individuals(variant)
     assert optimizer.fitness.tolist() == [-np.inf] * population
     for generation in range(4):
         assert optimizer.generation == generation
@@ -260,6 +320,60 @@ def test_every_numpy_generator_can_be_saved(kind):
     assert_same(evolve(resumed, 2), evolve(fresh(0), 4))
 
 
+# --- Racing --------------------------------------------------------------------------
+
+
+def plateaus(genomes: np.ndarray) -> np.ndarray:
+    """The sphere in steps, so that many are told exactly what they have to beat."""
+    return np.round(sphere(genomes) / 4)
+
+
+@every_variant
+def test_to_beat_has_one_value_for_each_genome_asked(variant):
+    optimizer = make(variant)
+    for generation in range(4):
+        genomes = optimizer.ask()
+        to_beat = optimizer.to_beat()
+        assert to_beat.shape == (len(genomes),)
+        assert not np.isnan(to_beat).any()
+        if generation == 0:
+            assert np.all(to_beat == -np.inf)
+        # the caller's to keep
+        to_beat[:] = 99
+        optimizer.tell(sphere(genomes))
+    assert_same(optimizer, evolve(make(variant), 4))
+
+
+@every_variant
+def test_nothing_is_to_beat_before_something_is_asked(variant):
+    optimizer = make(variant)
+    for _ in range(2):
+        with pytest.raises(AskTellError, match=r"expected ask\(\) first"):
+            optimizer.to_beat()
+        evolve(optimizer, 1)
+    assert_same(optimizer, evolve(make(variant), 2))
+
+
+@every_variant
+@pytest.mark.parametrize("fitness", [sphere, plateaus])
+def test_racing_is_exact(variant, fitness):
+    honest, raced = make(variant), make(variant)
+    for _ in range(15):
+        evolve(honest, 1, fitness)
+        told = fitness(raced.ask())
+        raced.tell(np.where(told <= raced.to_beat(), -1e9, told))
+        np.testing.assert_array_equal(raced.population, honest.population)
+        np.testing.assert_array_equal(raced.fitness, honest.fitness)
+    assert_same(raced, honest)
+
+
+@pytest.mark.parametrize("variant", ["de-best", "random-search", "one-plus-one-es"])
+def test_there_is_something_to_win_by_racing(variant):
+    optimizer = evolve(make(variant), 10)
+    genomes = optimizer.ask()
+    assert np.mean(sphere(genomes) <= optimizer.to_beat()) > 0.5
+
+
 # --- Misuse --------------------------------------------------------------------------
 
 
@@ -329,7 +443,7 @@ def test_nan_is_the_worst_and_never_kept(variant):
         assert not np.isnan(optimizer.fitness).any()
     best = np.argmax(optimizer.fitness)
     assert optimizer.population[best, 0] <= 0
-    assert optimizer.fitness[best] > -0.1
+    assert optimizer.fitness[best] > found(variant)
 
 
 @every_variant
@@ -337,4 +451,4 @@ def test_nothing_but_the_worst_fitness_is_survived(variant):
     optimizer = evolve(make(variant), 5, lambda g: np.full(len(g), -np.inf))
     assert np.all(optimizer.fitness == -np.inf)
     assert np.isfinite(optimizer.population).all()
-    assert evolve(optimizer, 60).fitness.max() > -0.1
+    assert evolve(optimizer, 60).fitness.max() > found(variant)

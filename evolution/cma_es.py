@@ -1,0 +1,219 @@
+"""CMA-ES with restarts, maximising: the package `cmaes` behind ask and tell.
+
+Each start is a `cmaes.CMA` at a random mean in the initial range. When it has nothing
+left to find, the next generation starts another one with twice the population. A
+genome outside the bounds is drawn again up to 100 times, then clipped, by `cmaes`.
+
+A `cmaes.CMA` cannot be saved without pickle or its private attributes. But it is a
+function of its seed and of what it was told: that is the state, and it is restored by
+asking and telling everything again. Randomness is drawn in this order: for each start
+the mean, then the seed of `cmaes`, which has a bit generator of its own.
+
+Source:
+    N. Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772; restarts:
+    A. Auger and N. Hansen, IEEE Congress on Evolutionary Computation (2005) 1769-1776.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from cmaes import CMA
+from numpy.random import Generator
+from numpy.typing import ArrayLike
+
+from evolution.ask_tell import (
+    SearchSpace,
+    checked_fitness,
+    checked_state,
+    generator_state,
+    pending,
+    read_only,
+    refuse_pending,
+    restored_generator,
+)
+
+# With a single parent, half of 3, `cmaes` divides by a learning rate of 0.
+MIN_POPULATION = 4
+
+
+def made_finite(fitness: np.ndarray) -> np.ndarray:
+    """Fitness `(n,)` in the same order, without infinities.
+
+    The infinite ones come just behind the worst finite one, or just before the best: a
+    `cmaes.CMA` uses the order, and the range only to see that it has become nothing.
+
+    Args:
+        fitness: `(n,)` without NaN.
+    """
+    finite = fitness[np.isfinite(fitness)]
+    worst, best = (finite.min(), finite.max()) if len(finite) else (0.0, 0.0)
+    return np.clip(fitness, np.nextafter(worst, -np.inf), np.nextafter(best, np.inf))
+
+
+@dataclass(frozen=True)
+class CmaEsParameters:
+    """What a CMA-ES is made of.
+
+    Attributes:
+        population: individuals of a generation (lambda), at least 4; doubled by each
+            restart. The tutorial's default for 40 genes is 15.
+        sigma: first step size of each start, above 0, at most the width of the bounds.
+        restarts: start again when `cmaes` sees no more progress; otherwise go on.
+        algorithm: what it is, for configurations.
+
+    Raises:
+        ValueError: a value out of its range.
+    """
+
+    population: int = 15
+    sigma: float = 2.0
+    restarts: bool = True
+    algorithm: Literal["cma_es"] = "cma_es"
+    # read by the configuration: a misspelt key is refused
+    __pydantic_config__: ClassVar = {"extra": "forbid"}
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        if self.population < MIN_POPULATION:
+            raise ValueError(
+                f"population: expected at least {MIN_POPULATION} for two parents, "
+                f"got {self.population}"
+            )
+        if not 0 < self.sigma < np.inf:
+            raise ValueError(f"sigma: expected a number above 0, got {self.sigma}")
+
+
+class CmaEs:
+    """An `Optimizer`, 'cma-es', whose attributes are documented there.
+
+    Its population are the individuals last told, good or bad; it grows at a restart.
+    """
+
+    def __init__(
+        self, parameters: CmaEsParameters, space: SearchSpace, rng: Generator
+    ) -> None:
+        """Draw the first genomes; `rng` belongs to the optimiser from here on.
+
+        Raises:
+            ValueError: steps wider than the bounds.
+        """
+        width = space.upper - space.lower
+        if parameters.sigma > width:
+            raise ValueError(
+                f"sigma: expected at most {width}, the width of the bounds, "
+                f"got {parameters.sigma}"
+            )
+        self._parameters = parameters
+        self._space = space
+        self._rng = rng
+        # What the whole search follows from, together with what will be told.
+        self._birth = generator_state(rng)
+        self._told = [np.empty(0)]
+        self._asked: np.ndarray | None = None
+        self._cma = self._started(parameters.population)
+        self.name = "cma-es"
+        self.population = read_only(self._drawn())
+        self.fitness = read_only(np.full(parameters.population, -np.inf))
+        self.generation = 0
+
+    def next_size(self) -> int:
+        """Number of genomes the next ask returns."""
+        return self._cma.population_size
+
+    def ask(self) -> np.ndarray:
+        """Genomes to evaluate `(next_size(), genes)`, the caller's to keep.
+
+        Raises:
+            AskTellError: the last genomes have not been told.
+        """
+        refuse_pending(self._asked, "ask")
+        self._asked = self.population if self.generation == 0 else self._drawn()
+        return self._asked.copy()
+
+    def to_beat(self) -> np.ndarray:
+        """-inf `(n,)`: the whole generation is ranked.
+
+        Raises:
+            AskTellError: nothing was asked.
+        """
+        return np.full(len(pending(self._asked)), -np.inf)
+
+    def tell(self, fitness: ArrayLike) -> None:
+        """Make the generation asked the current one; start again if it is time.
+
+        Args:
+            fitness: of the genomes asked, in their order `(n,)`; NaN counts as -inf.
+
+        Raises:
+            AskTellError: nothing was asked, or another shape was expected.
+        """
+        asked = pending(self._asked)
+        told = checked_fitness(fitness, len(asked))
+        # It minimises.
+        costs = (-made_finite(told)).tolist()
+        self._cma.tell(list(zip(asked, costs, strict=True)))
+        if self._parameters.restarts and self._cma.should_stop():
+            self._cma = self._started(2 * self._cma.population_size)
+        self._told.append(told)
+        self.population = read_only(asked)
+        self.fitness = read_only(told)
+        self.generation += 1
+        self._asked = None
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything the next generations depend on; see `Optimizer.state`."""
+        refuse_pending(self._asked, "take the state")
+        return self._arrays()
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Go on where `state` was taken; see `Optimizer.restore`.
+
+        Takes as long as all asks and tells up to there. What was told must also fill
+        whole generations, and as many as there were.
+        """
+        # As long as it is; all the rest is as in any other state.
+        n_told = np.size(state["told"]) if "told" in state else 0
+        like = {**self._arrays(), "told": np.empty(n_told)}
+        arrays = checked_state(state, like=like)
+        rng = restored_generator(self._rng, arrays["generator"])
+        replayed = CmaEs(self._parameters, self._space, rng)
+        told, generations = arrays["told"], int(arrays["generation"])
+        while len(told) >= replayed.next_size():
+            n = replayed.next_size()
+            replayed.ask()
+            replayed.tell(told[:n])
+            told = told[n:]
+        if len(told) or replayed.generation != generations:
+            raise ValueError(
+                f"state array 'told': expected the fitness of {generations} "
+                f"generations, got {n_told} values, of {replayed.generation} "
+                f"generations and {len(told)} more individuals"
+            )
+        # All of it: another search has begun and come as far as this.
+        vars(self).update(vars(replayed))
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return {
+            "name": np.array(self.name),
+            "generation": np.array(self.generation),
+            "told": np.concatenate(self._told),
+            "generator": self._birth.copy(),
+        }
+
+    def _started(self, population: int) -> CMA:
+        """A new search of that population at a random mean."""
+        space = self._space
+        mean = self._rng.uniform(space.init_lower, space.init_upper, size=space.genes)
+        return CMA(
+            mean=mean,
+            sigma=self._parameters.sigma,
+            bounds=np.tile([space.lower, space.upper], (space.genes, 1)),
+            seed=int(self._rng.integers(2**32)),
+            population_size=population,
+        )
+
+    def _drawn(self) -> np.ndarray:
+        """The next genomes of the present search `(next_size(), genes)`."""
+        return np.array([self._cma.ask() for _ in range(self.next_size())])

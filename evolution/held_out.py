@@ -1,0 +1,129 @@
+"""Held-out evaluation: what fresh starts say of a controller, and what it does there.
+
+The numbers that a study reports.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from epuck_mj.behaviour_classes import class_shares
+from epuck_mj.clearance import ClearanceProbe
+from epuck_mj.control import Policy, TaskParameters
+from epuck_mj.metrics import behaviour
+from epuck_mj.model import Scene
+from epuck_mj.simulation import SimulatedRobots
+from epuck_mj.starts import FreeSpace
+from epuck_mj.tracks import record_tracks
+from epuck_mj.wall_loops import wall_loops
+from evolution.champion import N_TEST, starts_for_test
+from evolution.statistics import mean_interval, worst_share_mean
+
+CAPACITY = 256
+"""Robots simulated at once: bounds memory, changes no result."""
+
+INTERVAL_SEED = 0
+"""Of the bootstrap's resamples, so that the same trials give the same interval."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """A controller on `starts` fresh starts.
+
+    Attributes:
+        mean: fitness over the starts.
+        standard_deviation: of the fitness of a start.
+        interval: bootstrap 95 % confidence bounds of the mean.
+        worst: mean of the worst 5 % of the starts.
+        crash_rate: share of the trials that ended in a crash.
+        collisions_per_minute: crashes per minute lived.
+        starts: how many there were.
+        behaviour: share of the trials by behaviour class.
+        metrics: mean of each of `epuck_mj.metrics.Behaviour` over the trials that have
+            it, None if none has.
+    """
+
+    mean: float
+    standard_deviation: float
+    interval: tuple[float, float]
+    worst: float
+    crash_rate: float
+    collisions_per_minute: float
+    starts: int
+    behaviour: Mapping[str, float]
+    metrics: Mapping[str, float | None]
+
+
+class Everybody:
+    """A batch policy whose members are all the same."""
+
+    def __init__(self, policy: Policy):
+        """Name the policy of them all."""
+        self._policy = policy
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """Actions `(robots, 2)` for observations `(robots, 8)`."""
+        return self._policy(observation)
+
+    def __getitem__(self, index: np.ndarray) -> Self:
+        """Itself."""
+        return self
+
+
+class Judge:
+    """Tests controllers in one scene."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        task: TaskParameters,
+        start_clearance: float,
+        threads: int = 0,
+    ):
+        """Measure the arena.
+
+        Args:
+            scene: robot and arena.
+            task: what a trial is.
+            start_clearance: least distance from the shell to a wall at a start [m].
+            threads: that step the robots; 0 is one per core.
+
+        Raises:
+            UserError: if the arena has no room, or a wall of which no clearance can be
+                measured.
+        """
+        self.scene = scene
+        self._space = FreeSpace(scene, start_clearance)
+        self._task = task
+        self._threads = threads
+        self._probe = ClearanceProbe(scene, threads)
+        self._loops = wall_loops(scene, self._probe)
+
+    def starts(self, n: int = N_TEST) -> np.ndarray:
+        """The first of the test starts of this scene, `(n, 3)`."""
+        return starts_for_test(self._space, n)
+
+    def test(self, policy: Policy, n: int = N_TEST) -> HeldOut:
+        """What the first `n` test starts say of a policy, one for all of them."""
+        robots = SimulatedRobots(self.scene, min(CAPACITY, n), self._threads)
+        tracks = record_tracks(robots, Everybody(policy), self.starts(n), self._task)
+        clearance = self._probe.measure(tracks.pose)
+        did = behaviour(tracks, clearance, self._loops, self._task)
+        fitness = tracks.trial_fitness
+        interval = mean_interval(fitness, np.random.default_rng(INTERVAL_SEED))
+        return HeldOut(
+            mean=float(fitness.mean()),
+            standard_deviation=float(fitness.std(ddof=1)),
+            interval=(interval.low, interval.high),
+            worst=worst_share_mean(fitness),
+            crash_rate=float(tracks.crashed.mean()),
+            collisions_per_minute=did.collisions_per_minute,
+            starts=n,
+            behaviour=class_shares(did),
+            metrics={
+                name: None if np.isnan(value) else value
+                for name, value in did.means.items()
+            },
+        )

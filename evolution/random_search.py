@@ -1,0 +1,156 @@
+"""Random search, maximising: the baseline that learns nothing.
+
+Every generation is drawn uniformly in the initial range, whatever has been told; the
+best individuals seen so far are kept. Randomness is drawn in this order: each
+generation's genomes, the first when the optimiser is made.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike
+
+from evolution.ask_tell import (
+    SearchSpace,
+    checked_fitness,
+    checked_state,
+    generator_state,
+    pending,
+    read_only,
+    refuse_pending,
+    restored_generator,
+)
+
+
+def best_of(fitness: np.ndarray, n: int) -> np.ndarray:
+    """Indices `(n,)`, ascending, of the `n` highest; of equals the first are taken.
+
+    Args:
+        fitness: `(at least n,)`.
+        n: how many.
+    """
+    best_first = np.argsort(-fitness, kind="stable")
+    return np.sort(best_first[:n])
+
+
+@dataclass(frozen=True)
+class RandomSearchParameters:
+    """What a random search is made of.
+
+    Attributes:
+        population: genomes of a generation, and individuals kept, at least 1.
+        algorithm: what it is, for configurations.
+
+    Raises:
+        ValueError: a value out of its range.
+    """
+
+    population: int = 100
+    algorithm: Literal["random_search"] = "random_search"
+    # read by the configuration: a misspelt key is refused
+    __pydantic_config__: ClassVar = {"extra": "forbid"}
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        if self.population < 1:
+            raise ValueError(f"population: expected at least 1, got {self.population}")
+
+
+class RandomSearch:
+    """An `Optimizer`, 'random-search', whose attributes are documented there.
+
+    Its population are the best individuals seen so far, the oldest first.
+    """
+
+    def __init__(
+        self,
+        parameters: RandomSearchParameters,
+        space: SearchSpace,
+        rng: Generator,
+    ) -> None:
+        """Draw the first genomes; `rng` belongs to the optimiser from here on."""
+        self._parameters = parameters
+        self._space = space
+        self._rng = rng
+        self._asked: np.ndarray | None = None
+        self.name = "random-search"
+        self.population = read_only(self._drawn())
+        self.fitness = read_only(np.full(parameters.population, -np.inf))
+        self.generation = 0
+
+    def next_size(self) -> int:
+        """Number of genomes the next ask returns."""
+        return self._parameters.population
+
+    def ask(self) -> np.ndarray:
+        """Genomes to evaluate `(population, genes)`, the caller's to keep.
+
+        Raises:
+            AskTellError: the last genomes have not been told.
+        """
+        refuse_pending(self._asked, "ask")
+        self._asked = self.population if self.generation == 0 else self._drawn()
+        return self._asked.copy()
+
+    def to_beat(self) -> np.ndarray:
+        """Fitness `(n,)` to exceed: the lowest one kept, -inf at first.
+
+        Raises:
+            AskTellError: nothing was asked.
+        """
+        # Before the first tell the stored fitness is -inf.
+        return np.full(len(pending(self._asked)), self.fitness.min())
+
+    def tell(self, fitness: ArrayLike) -> None:
+        """Keep the best of those kept and those asked; of equals the older.
+
+        Args:
+            fitness: of the genomes asked, in their order `(n,)`; NaN counts as -inf.
+
+        Raises:
+            AskTellError: nothing was asked, or another shape was expected.
+        """
+        asked = pending(self._asked)
+        told = checked_fitness(fitness, len(asked))
+        if self.generation == 0:
+            self.fitness = read_only(told)
+        else:
+            seen = np.concatenate([self.population, asked])
+            seen_fitness = np.concatenate([self.fitness, told])
+            kept = best_of(seen_fitness, len(asked))
+            self.population = read_only(seen[kept])
+            self.fitness = read_only(seen_fitness[kept])
+        self.generation += 1
+        self._asked = None
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything the next generations depend on; see `Optimizer.state`."""
+        refuse_pending(self._asked, "take the state")
+        return self._arrays()
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Go on where `state` was taken; see `Optimizer.restore`."""
+        arrays = checked_state(state, like=self._arrays())
+        self._rng = restored_generator(self._rng, arrays["generator"])
+        self.population = read_only(arrays["population"])
+        self.fitness = read_only(arrays["fitness"])
+        self.generation = int(arrays["generation"])
+        self._asked = None
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return {
+            "name": np.array(self.name),
+            "generation": np.array(self.generation),
+            "population": self.population.copy(),
+            "fitness": self.fitness.copy(),
+            "generator": generator_state(self._rng),
+        }
+
+    def _drawn(self) -> np.ndarray:
+        """Genomes `(population, genes)`, uniform in the initial range."""
+        space = self._space
+        shape = (self._parameters.population, space.genes)
+        return self._rng.uniform(space.init_lower, space.init_upper, size=shape)

@@ -1,0 +1,149 @@
+"""Samples of runs described: means, shares and quartiles with their bounds.
+
+The unit is the run: a sample is `(n,)`, one value per run, finite and not empty, or
+there is a `ValueError`. One run has a value but no spread: its bootstrap bounds are
+nan. The same generator gives the same bounds.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+RESAMPLES = 2000
+"""Of each bootstrap."""
+
+BATCH = 200
+"""Resamples in memory at once: small arrays stay in the cache."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An estimate and its confidence bounds.
+
+    Attributes:
+        value: the estimate itself.
+        low: lower bound, nan if one run says nothing about the spread.
+        high: upper bound, likewise.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+def mean_interval(
+    sample: np.ndarray, rng: np.random.Generator, confidence: float = 0.95
+) -> Interval:
+    """Mean of `(n,)` with a BCa bootstrap; a constant sample has a mean without doubt.
+
+    Source: Efron 1987, "Better bootstrap confidence intervals".
+    """
+    sample = checked(sample)
+    value = float(sample.mean())
+    if sample.size < 2:
+        return Interval(value, math.nan, math.nan)
+    if np.ptp(sample) == 0:
+        return Interval(value, value, value)
+    low, high = bootstrap((sample,), np.mean, "BCa", rng, confidence)
+    return Interval(value, low, high)
+
+
+def wilson(successes: int, n: int, confidence: float = 0.95) -> Interval:
+    """Share of successes with Wilson's interval.
+
+    Source: Wilson 1927, without continuity correction.
+
+    Raises:
+        ValueError: if there are no trials or more successes than trials.
+    """
+    check_successes(successes, n)
+    test = stats.binomtest(successes, n)
+    low, high = test.proportion_ci(confidence, method="wilson")
+    return Interval(successes / n, float(low), float(high))
+
+
+@dataclass(frozen=True)
+class Quartiles:
+    """Median and quartiles of a sample."""
+
+    lower: float
+    median: float
+    upper: float
+
+
+def quartiles(sample: np.ndarray) -> Quartiles:
+    """Quartiles of `(n,)`, interpolated as numpy does by default."""
+    return Quartiles(*np.quantile(checked(sample), [0.25, 0.5, 0.75]).tolist())
+
+
+def worst_share_mean(sample: np.ndarray, share: float = 0.05) -> float:
+    """Mean of the lowest `share` of `(n,)`, rounded up to whole values.
+
+    Source: conditional value at risk, Rockafellar and Uryasev 2000.
+
+    Raises:
+        ValueError: if the share is not in (0, 1].
+    """
+    sample = checked(sample)
+    if not 0 < share <= 1:
+        raise ValueError(f"expected a share in (0, 1], got {share}")
+    # a share such as 0.07 of 100 is a little more than 7 in floats
+    n_worst = math.ceil(round(share * sample.size, 9))
+    return float(np.sort(sample)[: max(n_worst, 1)].mean())
+
+
+def checked(sample: np.ndarray) -> np.ndarray:
+    """A sample `(n,)` as floats.
+
+    Raises:
+        ValueError: if it is empty, not finite or has another shape.
+    """
+    sample = np.asarray(sample, float)
+    if sample.ndim != 1 or not sample.size:
+        raise ValueError(f"expected a sample (n,), n > 0, got shape {sample.shape}")
+    if not np.isfinite(sample).all():
+        n_bad = np.count_nonzero(~np.isfinite(sample))
+        raise ValueError(f"expected finite values, got {n_bad} that are not")
+    return sample
+
+
+def check_successes(successes: int, n: int) -> None:
+    """Refuse a share that is none.
+
+    Raises:
+        ValueError: if there are no trials or more successes than trials.
+    """
+    if not 0 <= successes <= n or n < 1:
+        raise ValueError(f"expected 0 to n successes, n > 0, got {successes} of {n}")
+
+
+def bootstrap(
+    samples: tuple[np.ndarray, ...],
+    statistic: Callable,
+    method: str,
+    rng: np.random.Generator,
+    confidence: float,
+) -> tuple[float, float]:
+    """Bounds of a statistic over resamples of each sample.
+
+    Args:
+        samples: each `(n,)`, of at least two values.
+        statistic: of arrays `(..., n)` along an `axis`, `(...)`.
+        method: as scipy calls it.
+        rng: draws the resamples.
+        confidence: probability to hold the true value.
+    """
+    interval = stats.bootstrap(
+        samples,
+        statistic,
+        n_resamples=RESAMPLES,
+        batch=BATCH,
+        vectorized=True,
+        confidence_level=confidence,
+        method=method,
+        rng=rng,
+    ).confidence_interval
+    return float(interval.low), float(interval.high)
