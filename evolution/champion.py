@@ -71,6 +71,16 @@ def candidates(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
     return genomes[first], stored[first]
 
 
+def most_believed(experiment: Experiment) -> tuple[np.ndarray, float]:
+    """The genome `(genes,)` with the highest stored fitness of the run, and that.
+
+    What a run without held-out starts would show as its best.
+    """
+    best = [record.best for record in experiment.records]
+    generation = int(np.argmax(best))
+    return experiment.best_genomes[generation], best[generation]
+
+
 def choose_champion(engine: Engine, experiment: Experiment) -> Champion:
     """The candidate with the highest mean on the validation starts."""
     genomes, stored = candidates(experiment)

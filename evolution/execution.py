@@ -61,7 +61,7 @@ class Run:
         self.experiment = Experiment(config, means.engine, means.threads, means.racing)
         self.directory = directory
         # found out now, not after the evolution
-        self._judges = judges(self.experiment, means.threads)
+        self._judges = judges(config, means.threads)
         self._provenance = provenance(
             self.experiment.scene, argv, str(means.engine), means.threads
         )

@@ -11,7 +11,8 @@ from epuck_mj.controller import ControllerFile
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.recording import save_recording
 from epuck_mj.trajectory import record
-from evolution.champion import Champion, choose_champion
+from evolution.champion import Champion, choose_champion, most_believed
+from evolution.config import ExperimentConfig
 from evolution.evaluation import BatchEngine
 from evolution.experiment import Experiment
 from evolution.figures import fitness_figure, save_figure, trajectory_figure
@@ -25,20 +26,21 @@ N_SHOWN = 4
 """Trials of the champion in the picture; the first is also the recording."""
 
 
-def judges(experiment: Experiment, threads: int = 0) -> dict[str, Judge]:
-    """The robots that the champion is tested on: its own, and the one on wheels.
+def judges(config: ExperimentConfig, threads: int = 0) -> dict[str, Judge]:
+    """The robots that a champion is tested on: its own, and the one on wheels.
 
     Raises:
         UserError: if the wheeled robot cannot use the arena, or nobody can measure it.
     """
-    config = experiment.config
-    wheeled = load_scene(WHEELED_ROBOT, config.arena, config.control_step)
-    scenes = {Path(config.robot).name: experiment.scene, WHEELED_ROBOT: wheeled}
-    if experiment.scene.robot == wheeled.robot:
-        scenes = {WHEELED_ROBOT: wheeled}
+    names = {Path(robot).name: robot for robot in (config.robot, WHEELED_ROBOT)}
     return {
-        robot: Judge(scene, config.task, config.start_clearance, threads)
-        for robot, scene in scenes.items()
+        name: Judge(
+            load_scene(robot, config.arena, config.control_step),
+            config.task,
+            config.start_clearance,
+            threads,
+        )
+        for name, robot in names.items()
     }
 
 
@@ -65,7 +67,11 @@ def write_results(
     )
     policy = config.network.decode(champion.genome)
     tests = {robot: judge.test(policy) for robot, judge in judges.items()}
-    controller = _controller_file(experiment, champion, tests)
+    # what the run believed its best to be, and what that is worth where it evolved
+    genome, stored = most_believed(experiment)
+    believed = next(iter(judges.values())).test(config.network.decode(genome))
+    most = {"stored": stored, "held_out": believed.mean}
+    controller = _controller_file(experiment, champion, tests, most)
     files.write_text(directory.champion, controller.to_json())
     _draw_fitness(experiment, directory)
     wheeled = judges[WHEELED_ROBOT]
@@ -99,7 +105,10 @@ def _held_out(controller: ControllerFile) -> str:
 
 
 def _controller_file(
-    experiment: Experiment, champion: Champion, tests: dict[str, HeldOut]
+    experiment: Experiment,
+    champion: Champion,
+    tests: dict[str, HeldOut],
+    most_believed: dict[str, float],
 ) -> ControllerFile:
     config = experiment.config
     return ControllerFile(
@@ -115,6 +124,7 @@ def _controller_file(
             "stored": champion.stored_fitness,
             "validation": champion.validation_fitness,
             "held_out": {robot: asdict(test) for robot, test in tests.items()},
+            "most_believed": most_believed,
         },
     )
 

@@ -1,22 +1,24 @@
 """Many runs: `python -m evolution.study STUDY --seeds 1-30 --output runs/paper`."""
 
+import json
 import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import tyro
 from tqdm import tqdm
 
-from epuck_mj import controller
+from epuck_mj import controller, files
 from epuck_mj.command_line import command, main, parse
 from epuck_mj.errors import UserError
+from epuck_mj.wall_follower import WallFollower
 from evolution.execution import Means
 from evolution.interruption import Interrupted, interruptible
 from evolution.jobs import Event, Job, carry_out_side_by_side
-from evolution.results import scores
+from evolution.results import judges, scores
 from evolution.study_config import StudyConfig, find_study, parse_seeds
 from evolution.study_directory import StudyDirectory
 
@@ -91,6 +93,7 @@ def study(argv: Sequence[str]) -> int:
             file=sys.stderr,
         )
         return interruption.status
+    _measure_yardstick(directory, config)
     done = len(everything) - len(failed)
     minutes = (time.monotonic() - started) / 60
     print(f"{done} of {len(everything)} runs are finished, {minutes:.1f} min")
@@ -99,6 +102,21 @@ def study(argv: Sequence[str]) -> int:
     if done:
         print(f"Report: {command('evolution.report', directory.path)}")
     return 1 if failed else 0
+
+
+def _measure_yardstick(directory: StudyDirectory, config: StudyConfig) -> None:
+    """Test the hand-written wall follower as champions are, unless it was before."""
+    if directory.yardstick.exists():
+        return
+    # in the world of the first experiment
+    world = next(iter(config.experiments.values()))
+    tests = {
+        robot: asdict(judge.test(WallFollower()))
+        for robot, judge in judges(world).items()
+    }
+    with files.writing(directory.path):
+        text = json.dumps({"held_out": tests}, indent=1) + "\n"
+        files.write_text(directory.yardstick, text)
 
 
 def _finished(job: Job, directory: StudyDirectory) -> bool:
