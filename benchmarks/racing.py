@@ -1,0 +1,121 @@
+"""What racing saves: `python -m benchmarks.racing --json results/racing.json`.
+
+Evolves with racing, as `evolution.run` does, and lives every tenth generation a second
+time without it: the same individuals on the same starts, one right after the other, so
+that the machine's other work falls on both alike.
+"""
+
+import json
+import statistics
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from epuck_mj import files
+from epuck_mj.command_line import main, parse
+from epuck_mj.control import Trials
+from epuck_mj.controller import Controller
+from evolution.config import find_config, load_config
+from evolution.evaluation import BatchEngine, Race
+from evolution.experiment import Experiment
+from evolution.study_config import parse_seeds
+
+EVERY = 10
+"""Of so many generations one is lived both ways."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Measure the control steps and the time that racing saves.
+
+    Attributes:
+        experiment: a shipped experiment or a YAML file.
+        seeds: as 1-5 or 1,3.
+        threads: threads that step the robots; 0 is one per core.
+        json: also write everything to this file.
+    """
+
+    experiment: tyro.conf.Positional[str] = "de-best"
+    seeds: str = "1-5"
+    threads: int = 0
+    json: Path | None = None
+
+
+class BothWays:
+    """An engine that lives every tenth generation with and without racing."""
+
+    def __init__(self, engine: BatchEngine):
+        """Measure nothing yet."""
+        self._engine = engine
+        self._generation = 0
+        self.steps = {True: 0, False: 0}
+        self.seconds = {True: 0.0, False: 0.0}
+
+    def run(self, controller: Controller, starts, race: Race | None = None) -> Trials:
+        """See `Engine.run`."""
+        sampled = self._generation % EVERY == 0
+        self._generation += 1
+        if sampled:
+            self._timed(controller, starts, None)
+        return self._timed(controller, starts, race, counted=sampled)
+
+    def _timed(self, controller, starts, race, counted: bool = True) -> Trials:
+        started = time.perf_counter()
+        trials = self._engine.run(controller, starts, race)
+        if counted:
+            self.seconds[race is not None] += time.perf_counter() - started
+            self.steps[race is not None] += int(trials.steps.sum())
+        return trials
+
+
+def racing(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status."""
+    options = parse(Options, "python -m benchmarks.racing", argv, Options())
+    config = load_config(find_config(options.experiment))
+    runs = []
+    for seed in parse_seeds(options.seeds):
+        seeded = config.model_copy(update={"seed": seed})
+        experiment = Experiment(seeded, threads=options.threads)
+        both = BothWays(BatchEngine(experiment.scene, seeded.task, options.threads))
+        experiment.engine = both
+        for record in experiment.run():
+            if record.generation % 50 == 0:
+                print(f"seed {seed}: generation {record.generation}", file=sys.stderr)
+        runs.append(
+            {
+                "seed": seed,
+                "generations": len(experiment.records),
+                "control_steps": sum(r.control_steps for r in experiment.records),
+                "share_of_steps": both.steps[True] / both.steps[False],
+                "share_of_time": both.seconds[True] / both.seconds[False],
+            }
+        )
+        print(
+            f"seed {seed}: {runs[-1]['share_of_steps']:.3f} of the control steps, "
+            f"{runs[-1]['share_of_time']:.3f} of the time",
+            flush=True,
+        )
+    result = {
+        "experiment": options.experiment,
+        "threads": options.threads,
+        "every": EVERY,
+        "median_share_of_steps": statistics.median(r["share_of_steps"] for r in runs),
+        "median_share_of_time": statistics.median(r["share_of_time"] for r in runs),
+        "runs": runs,
+    }
+    print(
+        f"median: {result['median_share_of_steps']:.3f} of the control steps, "
+        f"{result['median_share_of_time']:.3f} of the time"
+    )
+    if options.json is not None:
+        with files.writing(options.json.parent):
+            files.write_text(options.json, json.dumps(result, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    main(racing)

@@ -1,0 +1,151 @@
+"""`evolution.evaluate` and `evolution.verify`: champions tested again, by anybody."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from epuck_mj.controller import load
+from epuck_mj.errors import UserError
+from evolution.config import ExperimentConfig, find_config, load_config
+from evolution.evaluate import evaluate
+from evolution.execution import Means, Run
+from evolution.held_out import Judge
+from evolution.run_directory import RunDirectory
+from evolution.verify import verify
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory) -> Path:
+    """A study directory of a single, tiny run."""
+    fields = load_config(find_config("ga")).model_dump()
+    fields |= {"evaluations": 20, "steps": 20, "trials": 2}
+    fields["optimizer"]["population"] = 10
+    path = tmp_path_factory.mktemp("study") / "ga" / "seed-1"
+    run = Run(ExperimentConfig.parsed(fields, "ga"), RunDirectory(path), Means(), ())
+    run.start()
+    assert len(list(run.evolve())) == 2
+    run.finish()
+    return path
+
+
+def test_evaluation_says_what_the_run_said(finished, tmp_path, capsys):
+    out = tmp_path / "out.json"
+    assert evaluate([str(finished), "--json", str(out)]) == 0
+    written = load(finished / "champion.json").scores["held_out"]
+    tests = json.loads(out.read_text())
+    assert (
+        [test["robot"] for test in tests] == list(written) == ["epuck_planar", "epuck"]
+    )
+    for test in tests:
+        assert test.items() >= written[test["robot"]].items()
+    text = capsys.readouterr().out
+    assert f"mean {tests[0]['mean']:.1f}" in text
+    assert "1000 starts" in text
+
+
+def test_a_study_a_run_and_a_file_lead_to_the_same_champion(finished, capsys):
+    study = finished.parent.parent
+    for path in (study, finished, finished / "champion.json"):
+        assert evaluate([str(path), "--starts", "5", "--robot", "epuck_planar"]) == 0
+    blocks = capsys.readouterr().out.split("epuck_planar in arena\n")
+    outcomes = [re.sub(r"\n\S.*", "", block, flags=re.S) for block in blocks[1:]]
+    assert len(outcomes) == 3
+    assert len({outcome.strip() for outcome in outcomes}) == 1
+
+
+def test_the_hand_written_follower_follows(capsys):
+    arguments = ["wall-follower", "--starts", "10", "--robot", "epuck_planar"]
+    assert evaluate(arguments) == 0
+    assert "behaviour: wall follower 100.0%" in capsys.readouterr().out
+
+
+def test_another_arena(finished, tmp_path, capsys):
+    arena = tmp_path / "small.xml"
+    walls = "".join(
+        f'<geom type="box" pos="{x} {y} 0.05" size="{a} {b} 0.05"/>'
+        for x, y, a, b in [
+            (0.3, 0, 0.01, 0.3),
+            (-0.3, 0, 0.01, 0.3),
+            (0, 0.3, 0.3, 0.01),
+            (0, -0.3, 0.3, 0.01),
+        ]
+    )
+    arena.write_text(f"<mujoco><worldbody>{walls}</worldbody></mujoco>")
+    arguments = ["--starts", "5", "--arena", str(arena), "--robot", "epuck_planar"]
+    assert evaluate([str(finished), *arguments]) == 0
+    assert "epuck_planar in small.xml" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "expected run or study directories"),
+        (["nowhere"], "cannot read controller 'nowhere'"),
+        (["wall-follower", "--starts", "1"], "expected 2 to 100000 starts, got 1"),
+        (["wall-follower", "--robot", "r2d2"], "r2d2"),
+        (["."], "no champion in '.'"),
+    ],
+)
+def test_bad_input_gets_one_line(arguments, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match=re.escape(message)) as error:
+        evaluate(arguments)
+    assert "\n" not in str(error.value)
+
+
+def test_threads_change_nothing(scene):
+    from epuck_mj.control import TaskParameters
+    from epuck_mj.wall_follower import WallFollower
+
+    tests = [
+        Judge(scene, TaskParameters(steps=50), 0.01, threads).test(WallFollower(), 300)
+        for threads in (1, 2)
+    ]
+    assert tests[0] == tests[1]
+    assert tests[0].starts == 300
+    assert sum(tests[0].behaviour.values()) == pytest.approx(1)
+    low, high = tests[0].interval
+    assert tests[0].worst < low < tests[0].mean < high
+
+
+def test_verify_finds_the_same_bits(finished, capsys):
+    assert verify([str(finished)]) == 0
+    assert verify([str(finished.parent.parent)]) == 0
+    assert capsys.readouterr().out.count("1 of 1 champions score the same") == 2
+
+
+def test_verify_names_what_differs(finished, tmp_path, capsys):
+    copy = tmp_path / "run"
+    copy.mkdir()
+    for name in ("config.yaml", "champion.json", "provenance.json"):
+        (copy / name).write_bytes((finished / name).read_bytes())
+    fields = json.loads((copy / "champion.json").read_text())
+    fields["scores"]["held_out"]["epuck"]["mean"] += 1
+    (copy / "champion.json").write_text(json.dumps(fields))
+    provenance = json.loads((copy / "provenance.json").read_text())
+    provenance["versions"]["mujoco"] = "3.0.0"
+    provenance["processor"]["flags"] = ["vax"]
+    (copy / "provenance.json").write_text(json.dumps(provenance))
+    assert verify([str(copy)]) == 1
+    text = capsys.readouterr().out
+    assert "epuck" in text
+    assert "mujoco 3.0.0 is now " in text
+    assert "CPU flags gone: vax" in text
+    assert "0 of 1 champions score the same" in text
+
+
+def test_verify_needs_a_champion(tmp_path):
+    with pytest.raises(UserError, match="no champion in"):
+        verify([str(tmp_path)])
+    with pytest.raises(UserError, match="expected run or study directories"):
+        verify([])
+
+
+def test_the_most_believed_is_tested_too(finished):
+    scores = load(finished / "champion.json").scores
+    history = np.genfromtxt(finished / "history.csv", delimiter=",", names=True)
+    assert scores["most_believed"]["stored"] == history["best"].max()
+    assert 0 <= scores["most_believed"]["held_out"] <= 20
