@@ -8,7 +8,7 @@ soon as it no longer can, since no control step is worth more than 1. Whoever be
 what it has to has lived all its trials, so no comparison comes out differently.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -102,7 +102,7 @@ class BatchEngine:
     ) -> Trials:
         """See `Engine.run`."""
         trials = 1 if race is None else race.trials
-        if trials > CAPACITY:
+        if trials > self._robots.capacity:
             # an individual does not fit: nobody is broken off
             trials, race = 1, None
         parts = [
@@ -113,9 +113,9 @@ class BatchEngine:
                 self._task,
                 None if race is None else race[chunk].lost,
             )
-            for chunk in _chunks(len(starts), trials)
+            for chunk in chunks(len(starts), trials, self._robots.capacity)
         ]
-        return _joined(parts)
+        return joined(parts)
 
 
 class DmControlEngine:
@@ -173,14 +173,15 @@ def evaluate(
     )
 
 
-def _chunks(n: int, whole: int) -> Iterator[slice]:
-    """Slices of at most `CAPACITY` of `n` trials; groups of `whole` stay together."""
-    size = CAPACITY - CAPACITY % whole
+def chunks(n: int, whole: int, most: int = CAPACITY) -> Iterator[slice]:
+    """Slices of `n` trials, `most` of them at most; groups of `whole` stay together."""
+    size = max(whole, most - most % whole)
     for first in range(0, n, size):
         yield slice(first, min(first + size, n))
 
 
-def _joined(parts: list[Trials]) -> Trials:
+def joined(parts: Sequence[Trials]) -> Trials:
+    """The trials of all parts, in their order."""
     return Trials(
         np.concatenate([part.fitness for part in parts]),
         np.concatenate([part.steps for part in parts]),

@@ -71,7 +71,7 @@ class Experiment:
     def __init__(
         self,
         config: ExperimentConfig,
-        engine: str = "batch",
+        engine: str | Engine = "batch",
         threads: int = 0,
         racing: bool = True,
     ):
@@ -79,7 +79,8 @@ class Experiment:
 
         Args:
             config: what to do.
-            engine: one of `ENGINES`: how trials are stepped, not what they give.
+            engine: one of `ENGINES`, or an engine: how trials are stepped, not what
+                they give.
             threads: of the batch engine; 0 is one per core.
             racing: break off individuals that can only lose; changes no result.
 
@@ -89,7 +90,9 @@ class Experiment:
         self.config = config
         self.scene = load_scene(config.robot, config.arena, config.control_step)
         self.space = FreeSpace(self.scene, config.start_clearance)
-        self.engine = make_engine(engine, self.scene, config, threads)
+        if isinstance(engine, str):
+            engine = make_engine(engine, self.scene, config, threads)
+        self.engine = engine
         self.racing = racing
         self.optimizer = _optimizer(config)
         self.records: list[Record] = []

@@ -9,8 +9,8 @@ import os
 import signal
 import threading
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -74,6 +74,17 @@ def carry_out(job: Job, means: Means, report: Callable[[int], None]) -> None:
     Raises:
         UserError: for anything the user can put right.
     """
+    with closing(generations(job, means)) as steps:
+        for evaluations in steps:
+            report(evaluations)
+
+
+def generations(job: Job, means: Means) -> Generator[int]:
+    """The same step by step: evaluations done, once per generation.
+
+    Raises:
+        UserError: for anything the user can put right.
+    """
     directory = RunDirectory(job.directory)
     with directory.locked(PATIENCE):
         if directory.config.exists():
@@ -84,7 +95,7 @@ def carry_out(job: Job, means: Means, report: Callable[[int], None]) -> None:
         else:
             run.start()
         for record in run.evolve():
-            report(record.evaluations)
+            yield record.evaluations
         run.finish()
 
 
@@ -129,7 +140,7 @@ def _started(job: Job, means: Means) -> tuple[BaseProcess, Connection]:
     process = context.Process(
         target=_work, args=(job, means, theirs), name=str(job), daemon=True
     )
-    with _deaf_to_interrupts():
+    with deaf_to_interrupts():
         process.start()
     theirs.close()
     return process, ours
@@ -138,19 +149,27 @@ def _started(job: Job, means: Means) -> tuple[BaseProcess, Connection]:
 def _work(job: Job, means: Means, news: Connection) -> None:
     """What the process does: report evaluations, and a failure if there is one."""
     threading.Thread(target=_die_with_parent, daemon=True).start()
-    log = failure_log(job.directory)
     try:
         carry_out(job, means, lambda evaluations: news.send((evaluations, None)))
-        log.unlink(missing_ok=True)
-    except UserError as error:
-        news.send((0, str(error)))
+        failure_log(job.directory).unlink(missing_ok=True)
+    except BrokenPipeError:
+        # the parent has gone
+        os._exit(1)
     except Exception as error:
-        with suppress(OSError):
-            log.write_text(traceback.format_exc(), encoding="utf-8")
-        reason = " ".join(str(error).split())
-        news.send((0, f"{type(error).__name__}: {reason} (see {log})"))
+        news.send((0, failure_of(job, error)))
     finally:
         news.close()
+
+
+def failure_of(job: Job, error: Exception) -> str:
+    """Why a job failed, on one line; what is nobody's to put right leaves a log."""
+    if isinstance(error, UserError):
+        return str(error)
+    log = failure_log(job.directory)
+    with suppress(OSError):
+        log.write_text("".join(traceback.format_exception(error)), encoding="utf-8")
+    reason = " ".join(str(error).split())
+    return f"{type(error).__name__}: {reason} (see {log})"
 
 
 def failure_log(directory: Path) -> Path:
@@ -175,8 +194,8 @@ def _ending(process: BaseProcess) -> str | None:
 
 
 @contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
-    """Children ignore Ctrl-C: the parent ends them."""
+def deaf_to_interrupts() -> Iterator[None]:
+    """Processes started in the block ignore Ctrl-C: their parent ends them."""
     previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield

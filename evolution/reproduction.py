@@ -59,7 +59,7 @@ def reproduction(study: StudyData, wheels: StudyData | None, made_by: str) -> st
         "only if the bounds of A12 leave 0.5 out; the claims are not adjusted for "
         "their number.",
         "## What there is",
-        _runs(study),
+        runs_table(study),
     ]
     if study.missing:
         parts += ["Missing:", _bullets(study.missing)]
@@ -76,14 +76,15 @@ def reproduction(study: StudyData, wheels: StudyData | None, made_by: str) -> st
     parts += ["## What stored fitness hides", _hidden(study), _believed(study)]
     parts += ["## From the plane to wheels", _rungs(study)]
     if wheels is not None:
-        parts += ["## Evolved on wheels from the start", _runs(wheels)]
+        parts += ["## Evolved on wheels from the start", runs_table(wheels)]
         parts += ["Missing:", _bullets(wheels.missing)] if wheels.missing else []
         parts += [_claims(held_out_order(wheels, wheels.robots[-1]))]
     parts += ["## What differs from the original", _differences(study)]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def _runs(study: StudyData) -> str:
+def runs_table(study: StudyData) -> str:
+    """The main table: held-out fitness first, then stored, of every experiment."""
     rows = []
     for name, runs in study.runs.items():
         if not runs:

@@ -222,7 +222,7 @@ class RunDirectory:
         Raises:
             UserError: if it is damaged.
         """
-        if not self.provenance.is_file():
+        if not files.is_file(self.provenance):
             return {}
         try:
             fields = json.loads(self.provenance.read_text(encoding="utf-8"))

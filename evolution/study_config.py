@@ -1,5 +1,6 @@
 """What a study is: experiments that are run with the same seeds and compared."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -159,11 +160,10 @@ def parse_seeds(text: str) -> list[int]:
     """
     seeds: list[int] = []
     for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        ends = [first, last] if dash else [first]
-        if not all(end.isascii() and end.isdigit() for end in ends):
+        ends = SEEDS.fullmatch(part.strip())
+        if ends is None:
             raise UserError(f"expected seeds as 1-30 or 1,3,5-8, got '{text}'")
-        low, high = int(ends[0]), int(ends[-1])
+        low, high = int(ends[1]), int(ends[2] or ends[1])
         if not low <= high < low + SEEDS_MAX:
             raise UserError(
                 f"expected seeds from a lower to a higher one, at most {SEEDS_MAX}, "
@@ -175,4 +175,5 @@ def parse_seeds(text: str) -> list[int]:
     return sorted(seeds)
 
 
+SEEDS = re.compile(r"(\d{1,18})(?:-(\d{1,18}))?", re.ASCII)
 SEEDS_MAX = 10_000

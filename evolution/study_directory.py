@@ -40,13 +40,18 @@ class StudyDirectory:
         with files.writing(self.path):
             if files.is_file(self.config):
                 config = self.stored_config().merged(config, self.path)
-            elif self.path.is_dir() and any(self.path.iterdir()):
+            elif self.path.is_dir() and self._holds_anything():
                 raise UserError(
                     f"output '{self.path}' is not empty and holds no study: expected "
                     "a new directory, or one with a study.yaml"
                 )
             self.path.mkdir(parents=True, exist_ok=True)
+            files.remove_leftovers(self.path)
             files.write_text(self.config, config.to_yaml())
+
+    def _holds_anything(self) -> bool:
+        """Whether more is there than what a killed writer left behind."""
+        return set(self.path.iterdir()) > set(files.leftovers(self.path))
 
     def stored_config(self) -> StudyConfig:
         """The study that is there.

@@ -1,8 +1,9 @@
 """The champion: who may be it, who is it, and what fresh starts say of it."""
 
+import json
 import math
 import statistics
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -17,13 +18,14 @@ from evolution.champion import (
     LATEST_BEST,
     candidates,
     choose_champion,
-    held_out,
+    most_believed,
     starts_for_test,
     starts_for_validation,
 )
 from evolution.config import ExperimentConfig, find_config, load_config
 from evolution.experiment import Experiment, Record
-from evolution.results import reported_scenes, summary, write_results
+from evolution.held_out import Judge
+from evolution.results import judges, summary, write_results
 from evolution.run_directory import RunDirectory
 
 SHIPPED = ("de-best", "de-rand", "ga")
@@ -105,7 +107,7 @@ def test_the_latest_twenty_of_the_best_so_far_are_candidates():
     # each generation raises the best; after it two that do not
     for i in range(n):
         for best in (10.0 + i, 10.0 + i, 5.0):
-            record = Record(len(experiment.records), 0, best, 0.0, 0.0, 0.0)
+            record = Record(len(experiment.records), 0, best, 0.0, 0.0, 0, 0.0)
             experiment.records.append(record)
             experiment.best_genomes.append(rng.random(genes))
     genomes, stored = candidates(experiment)
@@ -131,7 +133,7 @@ def test_the_tenth_is_rounded_and_at_least_one(population, n):
     fitness = np.random.default_rng(2).permutation(population).astype(float)
     experiment.optimizer.ask()
     experiment.optimizer.tell(fitness)
-    record = Record(0, population, fitness.max(), 0.0, 0.0, 0.0)
+    record = Record(0, population, fitness.max(), 0.0, 0.0, 0, 0.0)
     experiment.records.append(record)
     experiment.best_genomes.append(experiment.optimizer.population[fitness.argmax()])
     _, stored = candidates(experiment)
@@ -170,7 +172,7 @@ def test_stored_fitness_does_not_choose_the_champion():
     experiment.optimizer.ask()
     experiment.optimizer.tell(np.full(20, -1.0))
     for best, genome in ((3.0, fast), (9.0, still)):
-        record = Record(len(experiment.records), 20, best, 0.0, 0.0, 0.0)
+        record = Record(len(experiment.records), 20, best, 0.0, 0.0, 0, 0.0)
         experiment.records.append(record)
         experiment.best_genomes.append(genome)
     champion = choose_champion(experiment.engine, experiment)
@@ -183,22 +185,36 @@ def test_stored_fitness_does_not_choose_the_champion():
 
 def test_held_out_against_a_slow_loop(finished):
     experiment, _ = finished
+    config = experiment.config
+    judge = Judge(experiment.scene, config.task, config.start_clearance, threads=1)
+    # the first of all test starts
     starts = starts_for_test(experiment.space)[:25]
+    np.testing.assert_array_equal(judge.starts(25), starts)
     # drives straight on, so that some of the trials crash
-    genome = np.zeros(experiment.config.network.n_genes)
+    genome = np.zeros(config.network.n_genes)
     genome[32:36] = 5.0
     trials = [slow_trial(experiment, genome, start) for start in starts]
     fitness = [trial[0] for trial in trials]
-    report = held_out(experiment.engine, experiment.config.network, genome, starts)
+    report = judge.test(config.network.decode(genome), 25)
     assert report.mean == np.mean(fitness)
     assert report.mean == pytest.approx(statistics.mean(fitness), rel=1e-12)
-    assert report.standard_error == pytest.approx(
-        statistics.stdev(fitness) / math.sqrt(25), rel=1e-12
+    assert report.standard_deviation == pytest.approx(
+        statistics.stdev(fitness), rel=1e-12
     )
+    assert report.interval[0] < report.mean < report.interval[1]
     assert report.crash_rate == sum(crashed for _, crashed in trials) / 25
     assert report.starts == 25
     assert 0 < report.crash_rate < 1
-    assert report.standard_error > 0
+    assert report.standard_deviation > 0
+
+
+@pytest.fixture(autouse=True, scope="module")
+def few_test_starts():
+    """What is said of 1,000 starts is true of fewer."""
+    test = Judge.test
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Judge, "test", lambda self, policy, n=30: test(self, policy, n))
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -210,7 +226,7 @@ def written(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(results, "_draw_fitness", lambda *_: None)
         patch.setattr(results, "_show", lambda *_: None)
-        write_results(experiment, reported_scenes(experiment), directory, threads=1)
+        write_results(experiment, judges(experiment.config), directory, threads=1)
     return experiment, directory
 
 
@@ -232,20 +248,22 @@ def test_the_champion_file_holds_every_score(written):
     experiment, directory = written
     champion = choose_champion(experiment.engine, experiment)
     stored = controller.load(directory.champion)
-    wheeled = Experiment(experiment.config.model_copy(update={"robot": "epuck"}))
-    reports = {
-        robot: held_out(
-            each.engine,
-            each.config.network,
-            champion.genome,
-            starts_for_test(each.space),
-        )
-        for robot, each in (("epuck_planar", experiment), ("epuck", wheeled))
+    policy = experiment.config.network.decode(champion.genome)
+    tests = {
+        robot: judge.test(policy)
+        for robot, judge in judges(experiment.config, threads=1).items()
     }
+    assert list(tests) == ["epuck_planar", "epuck"]
+    # what evolution believed in most, on the robot that it was evolved on
+    genome, believed = most_believed(experiment)
+    judge = judges(experiment.config, threads=1)["epuck_planar"]
+    worth = judge.test(experiment.config.network.decode(genome))
     assert stored.scores == {
         "stored": champion.stored_fitness,
         "validation": champion.validation_fitness,
-        "held_out": {robot: vars(report) for robot, report in reports.items()},
+        # tuples are lists in JSON
+        "held_out": json.loads(json.dumps({k: asdict(v) for k, v in tests.items()})),
+        "most_believed": {"stored": believed, "held_out": worth.mean},
     }
     assert stored.task["steps"] == 20
     assert stored.scene == {
@@ -262,11 +280,10 @@ def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
     scores = stored.scores["held_out"]
     parts = []
     for robot in ("epuck_planar", "epuck"):
-        mean, error = scores[robot]["mean"], scores[robot]["standard_error"]
-        crashes = scores[robot]["crash_rate"]
-        parts.append(f"{robot} {mean:.1f} +- {error:.1f} ({crashes:.0%} crash)")
+        mean, crashes = scores[robot]["mean"], scores[robot]["crash_rate"]
+        parts.append(f"{robot} {mean:.1f} ({crashes:.0%} crash)")
     assert fresh == (
-        "Held-out fitness of 20, mean of 200 fresh starts: " + ", ".join(parts)
+        "Held-out fitness of 20, mean of 30 fresh starts: " + ", ".join(parts)
     )
     stored_fitness = stored.scores["stored"]
     assert believed == (
@@ -279,8 +296,9 @@ def test_a_run_on_the_wheeled_robot_is_reported_once(tmp_path, monkeypatch):
     monkeypatch.setattr(results, "_show", lambda *_: None)
     experiment = Experiment(tiny("ga", robot="epuck", steps=10, evaluations=20))
     list(experiment.run())
-    scenes = reported_scenes(experiment)
-    written = write_results(experiment, scenes, RunDirectory(tmp_path))
+    written = write_results(
+        experiment, judges(experiment.config), RunDirectory(tmp_path)
+    )
     assert list(written.scores["held_out"]) == ["epuck"]
     text = (tmp_path / "champion.json").read_text(encoding="utf-8")
     assert text == written.to_json()

@@ -13,7 +13,7 @@ from epuck_mj.simulation import SimulatedRobots
 from evolution.champion import starts_for_test, starts_for_validation
 from evolution.config import ExperimentConfig, find_config, load_config
 from evolution.experiment import (
-    HISTORY_HEADER,
+    HISTORY,
     Experiment,
     Purpose,
     Record,
@@ -66,8 +66,8 @@ class Watched:
         self.engine = engine
         self.calls = []
 
-    def run(self, controller, starts):
-        trials = self.engine.run(controller, starts)
+    def run(self, controller, starts, race=None):
+        trials = self.engine.run(controller, starts, race)
         self.calls.append((controller, starts.copy(), trials))
         return trials
 
@@ -103,7 +103,8 @@ def test_the_number_of_threads_changes_nothing(name):
 def test_both_engines_give_the_same_bytes(name):
     config = tiny(name, steps=40, evaluations=24)
     batch, dm_control = (
-        evolved(config, engine=engine) for engine in ("batch", "dm_control")
+        evolved(config, engine=engine, racing=False)
+        for engine in ("batch", "dm_control")
     )
     # or the comparison would say nothing about crashes
     assert any(record.crash_rate > 0 for record in batch.records)
@@ -127,26 +128,26 @@ def test_streams_depend_on_each_part_of_their_key():
 # records
 
 
-def slow_trial(scene, policy, start, task: TaskParameters) -> tuple[float, bool]:
-    """Fitness of one robot's trial and whether it crashed."""
+def slow_trial(scene, policy, start, task: TaskParameters) -> tuple[float, int, bool]:
+    """Fitness of one robot's trial, the steps it lived and whether it crashed."""
     robots = SimulatedRobots(scene, 1, 1)
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     fitness = 0.0
-    for _ in range(task.steps):
+    for i in range(task.steps):
         step = control_step(robots, policy, observation, task)
         if step.reading.contact[0]:
-            return fitness, True
+            return fitness, i + 1, True
         fitness += float(step.fitness[0])
         observation = step.observation
-    return fitness, False
+    return fitness, task.steps, False
 
 
 def test_a_generations_record_against_a_slow_loop():
     experiment = Experiment(tiny("ga", steps=40, trials=3), threads=1)
     generation = experiment.run()
     next(generation)
-    crashes, record = [], next(generation)
-    config, fitness = experiment.config, []
+    record = next(generation)
+    config, fitness, steps, crashes = experiment.config, [], [], []
     rng = random_generator(config.seed, Purpose.STARTS, 1)
     starts = experiment.space.sample(rng, 3)
     for genome in experiment.optimizer.population:
@@ -156,7 +157,8 @@ def test_a_generations_record_against_a_slow_loop():
             for start in starts
         ]
         fitness.append(np.mean([trial[0] for trial in trials]))
-        crashes += [crashed for _, crashed in trials]
+        steps += [lived for _, lived, _ in trials]
+        crashes += [crashed for _, _, crashed in trials]
     # the GA's population are the individuals last told
     assert experiment.optimizer.fitness.tolist() == fitness
     assert record == Record(
@@ -165,6 +167,7 @@ def test_a_generations_record_against_a_slow_loop():
         best=max(fitness),
         mean=float(np.mean(fitness)),
         std=float(np.std(fitness)),
+        control_steps=sum(steps),
         crash_rate=sum(crashes) / 24,
     )
     assert 0 < record.crash_rate < 1
@@ -183,6 +186,7 @@ def test_records_describe_the_optimizers_stored_fitness(name):
         # crashes of what was asked now, not of what is stored
         _, _, trials = watched.calls[-1]
         assert record.crash_rate == trials.crashed.mean()
+        assert record.control_steps == trials.steps.sum()
         best = experiment.optimizer.population[fitness.argmax()]
         np.testing.assert_array_equal(experiment.best_genomes[i], best)
     assert len(experiment.records) == len(experiment.best_genomes) == 5
@@ -200,18 +204,17 @@ def test_differential_evolution_never_loses_its_best(name):
 def test_history_reads_back_exactly():
     experiment = evolved(tiny("de-best"))
     header, *rows = experiment.history().splitlines()
-    assert header == "generation,evaluations,best,mean,std,crash_rate"
-    assert header == HISTORY_HEADER
+    assert header == "generation,evaluations,best,mean,std"
     assert experiment.history().endswith("\n")
     for row, record in zip(rows, experiment.records, strict=True):
         generation, evaluations, *rest = row.split(",")
         assert (int(generation), int(evaluations)) == astuple(record)[:2]
-        assert tuple(map(float, rest)) == astuple(record)[2:]
+        assert tuple(map(float, rest)) == astuple(record)[2:5]
 
 
 def test_no_history_yet():
     experiment = Experiment(tiny("ga"))
-    assert experiment.history() == HISTORY_HEADER + "\n"
+    assert experiment.history() == ",".join(HISTORY) + "\n"
     assert (experiment.evaluations, experiment.finished) == (0, False)
 
 
@@ -355,11 +358,13 @@ def test_starts_differ_between_generations_seeds_and_purposes():
     space = Experiment(tiny("ga")).space
     seen += [starts_for_validation(space), starts_for_test(space)]
     poses = np.concatenate(seen)
-    assert len(np.unique(poses[:, 0])) == len(poses) == 3 * 3 * 5 + 2 * 200
+    assert len(np.unique(poses[:, 0])) == len(poses) == 3 * 3 * 5 + 200 + 1000
 
 
-@pytest.mark.parametrize("draw", [starts_for_validation, starts_for_test])
-def test_held_out_starts_are_the_same_for_every_run(draw):
+@pytest.mark.parametrize(
+    ("draw", "n"), [(starts_for_validation, 200), (starts_for_test, 1000)]
+)
+def test_held_out_starts_are_the_same_for_every_run(draw, n):
     runs = [
         tiny("ga", seed=0),
         tiny("de-rand", seed=7, population=9, trials=3, steps=9, hidden=2),
@@ -368,7 +373,7 @@ def test_held_out_starts_are_the_same_for_every_run(draw):
     # used or not
     list(experiments[0].run())
     fixed = [draw(experiment.space) for experiment in experiments]
-    assert fixed[0].shape == (200, 3)
+    assert fixed[0].shape == (n, 3)
     assert np.array_equal(fixed[0], fixed[1])
     assert np.array_equal(fixed[0], draw(experiments[0].space))
 

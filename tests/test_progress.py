@@ -18,7 +18,7 @@ BUDGET = 4000
 
 
 def records() -> list[Record]:
-    return [Record(i, 100 * (i + 1), 2.0 * i, 1.0 * i, 0.5, 0.25) for i in range(40)]
+    return [Record(i, 100 * (i + 1), 2.0 * i, 1.0 * i, 0.5, 9, 0.25) for i in range(40)]
 
 
 def show() -> None:

@@ -3,6 +3,7 @@
 import errno
 import hashlib
 import json
+import math
 import os
 import random
 import re
@@ -26,10 +27,13 @@ from epuck_mj import controller, files
 from epuck_mj.errors import UserError
 from epuck_mj.model import MODELS
 from epuck_mj.trajectory import Trajectory
-from evolution import champion, results
+from evolution import champion, execution, results
 from evolution.config import CONFIGS, find_config, load_config
-from evolution.experiment import HISTORY_HEADER
+from evolution.experiment import HISTORY
+from evolution.held_out import Judge
+from evolution.optimizer import OPTIMIZERS
 from evolution.run import run
+from evolution.run_directory import LOCK
 
 TIMEOUT = 120
 """Seconds for what takes a few on a machine that does nothing else."""
@@ -52,6 +56,7 @@ PROMISED = {
     "trajectory.png",
     "champion.rrd",
 }
+THERE = PROMISED | {LOCK}
 REPRODUCED = ("history.csv", "champion.json")
 
 
@@ -84,6 +89,23 @@ def evolution(cwd: Path, *argv: str, **variables) -> subprocess.CompletedProcess
     return subprocess.CompletedProcess(argv, process.returncode, stdout, stderr)
 
 
+UNHURRIED = """
+import math, time
+from epuck_mj.command_line import main
+from evolution import execution, run_directory, run
+
+class RunDirectory(run_directory.RunDirectory):
+    def save(self, *arguments):
+        super().save(*arguments)
+        time.sleep(0.03)
+
+run.RunDirectory = RunDirectory
+execution.SAVING_SHARE = math.inf
+main(run.run)
+"""
+"""`evolution.run` that saves every generation and leaves time to look at it."""
+
+
 def wait_for(process: subprocess.Popen, moment: Callable[[], bool]) -> None:
     """Wait until then, or until the process has ended."""
     deadline = time.monotonic() + TIMEOUT
@@ -104,7 +126,7 @@ def n_rows(directory: Path) -> int:
     if not (directory / "history.csv").exists():
         return 0
     header, *rows = (directory / "history.csv").read_text().splitlines()
-    assert header == HISTORY_HEADER
+    assert header == ",".join(HISTORY)
     return len(rows)
 
 
@@ -131,19 +153,27 @@ def no_pictures(monkeypatch):
 
 
 @pytest.fixture
+def every_generation_saved(monkeypatch):
+    """However short it is."""
+    monkeypatch.setattr(execution, "SAVING_SHARE", math.inf)
+
+
+@pytest.fixture
 def quick(no_pictures, monkeypatch):
     """Few starts are held out too: for runs by the dozen."""
     monkeypatch.setattr(champion, "N_VALIDATION", 5)
-    monkeypatch.setattr(champion, "N_TEST", 5)
+    test = Judge.test
+    monkeypatch.setattr(Judge, "test", lambda self, policy: test(self, policy, 5))
 
 
 def tree(directory: Path) -> dict[str, str]:
-    """Everything below a directory, with a hash of the content of files."""
+    """Everything below a directory but locks, with a hash of the content of files."""
     return {
         str(path.relative_to(directory)): hashlib.sha256(path.read_bytes()).hexdigest()
         if path.is_file()
         else "directory"
         for path in sorted(directory.rglob("*"))
+        if path.name != LOCK
     }
 
 
@@ -204,13 +234,13 @@ def unfinished(finished, here):
 
 def test_all_promised_files_are_there_and_nothing_else(finished):
     directory, _ = finished
-    assert {path.name for path in directory.iterdir()} == PROMISED
+    assert {path.name for path in directory.iterdir()} == THERE
 
 
 def test_history(finished):
     directory, _ = finished
     header, *rows = (directory / "history.csv").read_text().splitlines()
-    assert header == "generation,evaluations,best,mean,std,crash_rate"
+    assert header == "generation,evaluations,best,mean,std"
     assert [row.split(",")[:2] for row in rows] == [
         [str(i), str(10 * (i + 1))] for i in range(6)
     ]
@@ -219,9 +249,13 @@ def test_history(finished):
 def test_timing(finished):
     directory, _ = finished
     header, *rows = (directory / "timing.csv").read_text().splitlines()
-    assert header == "generation,seconds"
-    assert [row.split(",")[0] for row in rows] == [str(i) for i in range(6)]
-    assert all(float(row.split(",")[1]) >= 0 for row in rows)
+    assert header == "generation,seconds,control_steps,crash_rate"
+    columns = list(zip(*(row.split(",") for row in rows), strict=True))
+    assert columns[0] == tuple(map(str, range(6)))
+    assert all(float(seconds) >= 0 for seconds in columns[1])
+    # 10 individuals, 2 trials of at most 20 steps, and one that crashes took one
+    assert all(20 <= int(steps) <= 400 for steps in columns[2])
+    assert all(0 <= float(crashed) <= 1 for crashed in columns[3])
 
 
 def test_the_stored_config_is_the_resolved_one(finished):
@@ -256,7 +290,7 @@ def test_provenance(finished):
 def test_the_checkpoint_holds_every_generation(finished):
     directory, _ = finished
     with np.load(directory / "checkpoint.npz", allow_pickle=False) as file:
-        assert file["records"].shape == (6, 6)
+        assert file["records"].shape == (6, 7)
         assert file["best_genomes"].shape == (6, 40)
         assert file["optimizer.fitness"].shape == (10,)
 
@@ -281,12 +315,11 @@ def test_the_summary_is_in_plain_words(finished):
     assert re.fullmatch(
         r"ga, seed 7: 60 evaluations in 6 generations, \d+ min \d+ s", first
     )
-    assert fresh.startswith("Held-out fitness of 20, mean of 200 fresh starts: ")
+    assert fresh.startswith("Held-out fitness of 20, mean of 1000 fresh starts: ")
     for robot in ("epuck_planar", "epuck"):
         report = scores["held_out"][robot]
-        mean, error = report["mean"], report["standard_error"]
-        assert f" {robot} {mean:.1f} +- {error:.1f} (" in fresh
-        assert f"({report['crash_rate']:.0%} crash)" in fresh
+        mean, crashes = report["mean"], report["crash_rate"]
+        assert f" {robot} {mean:.1f} ({crashes:.0%} crash)" in fresh
     assert stored.startswith("Stored fitness of 20, ")
     assert stored.endswith(f": {scores['stored']:.1f}")
     assert written == f"Written to run: {', '.join(sorted(PROMISED))}"
@@ -317,7 +350,7 @@ def test_own_yaml_default_output_and_the_same_seed_twice(finished, tmp_path):
     assert process.returncode == 0, process.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["my.yaml", "runs"]
     directory = tmp_path / "runs" / "my-seed-7"
-    assert {path.name for path in directory.iterdir()} == PROMISED
+    assert {path.name for path in directory.iterdir()} == THERE
     assert_reproduced(directory, finished[0])
     # pictures and recordings of the same run are the same too
     for name in ("config.yaml", "fitness.png", "trajectory.png", "trajectory.npz"):
@@ -337,11 +370,12 @@ def test_print_config_writes_nothing_and_loads_back(tmp_path):
     assert not any(tmp_path.iterdir())
     (tmp_path / "back.yaml").write_text(process.stdout)
     config = load_config(tmp_path / "back.yaml")
-    assert (config.seed, config.steps, config.optimizer.population) == (7, 20, 10)
+    assert (config.seed, config.steps) == (7, 20)
+    assert config.model_dump()["optimizer"]["population"] == 10
     assert config.to_yaml() == process.stdout
 
 
-@pytest.mark.parametrize("name", ["de-best", "de-rand", "ga"])
+@pytest.mark.parametrize("name", OPTIMIZERS)
 def test_print_config_of_a_shipped_experiment(name, here, capsys):
     assert run([name, "--print-config"]) == 0
     assert capsys.readouterr().out == load_config(find_config(name)).to_yaml()
@@ -649,7 +683,7 @@ def test_a_signal_ends_the_run_and_says_how_to_resume(
 ):
     argv = ["ga", "--seed", "7", *LONG, "--output", "some where"]
     directory = tmp_path / "some where"
-    with started(tmp_path, "-m", "evolution.run", *argv) as process:
+    with started(tmp_path, "-c", UNHURRIED, *argv) as process:
         wait_for(process, lambda: n_rows(directory) >= generations)
         process.send_signal(signum)
         stdout, stderr = process.communicate(timeout=TIMEOUT)
@@ -661,7 +695,7 @@ def test_a_signal_ends_the_run_and_says_how_to_resume(
     assert json.loads((directory / "provenance.json").read_text())["finished"] is None
     assert not (directory / "champion.rrd").exists()
     # no half-written file
-    assert not [path for path in directory.iterdir() if path.name.startswith(".")]
+    assert not files.leftovers(directory)
     monkeypatch.chdir(tmp_path)
     assert run(resume_command(stderr)) == 0
     assert_reproduced(directory, reference)
@@ -684,7 +718,7 @@ def test_kill_9_at_any_moment_loses_at_most_one_generation(reference, tmp_path):
         lambda: n_records(directory) == LONG_GENERATIONS,
     ]
     for moment in moments:
-        with started(tmp_path, "-m", "evolution.run", *argv) as process:
+        with started(tmp_path, "-c", UNHURRIED, *argv) as process:
             wait_for(process, moment)
             time.sleep(random.uniform(0, 0.2))
             process.kill()
@@ -701,7 +735,7 @@ def test_kill_9_at_any_moment_loses_at_most_one_generation(reference, tmp_path):
     assert process.returncode == 0, process.stderr
     assert_reproduced(directory, reference)
     assert n_records(directory) == LONG_GENERATIONS
-    assert {path.name for path in directory.iterdir()} >= PROMISED
+    assert {path.name for path in directory.iterdir()} == THERE
     timed = (directory / "timing.csv").read_text().split()[1:]
     generations = [int(row.split(",")[0]) for row in timed]
     assert generations == sorted(set(generations))
@@ -735,7 +769,9 @@ def test_resume_from_between_any_two_writes(here, quick, monkeypatch):
         assert n_records(here / moment) == 2
 
 
-def test_a_full_disk_leaves_what_was_there(here, quick, monkeypatch):
+def test_a_full_disk_leaves_what_was_there(
+    here, quick, every_generation_saved, monkeypatch
+):
     argv = ["ga", *TINY, "--output"]
     assert run([*argv, "whole"]) == 0
     sync, calls = os.fsync, []
@@ -752,7 +788,8 @@ def test_a_full_disk_leaves_what_was_there(here, quick, monkeypatch):
         with pytest.raises(UserError, match=r"No space left .* --resume run$"):
             run([*argv, "run"])
     names = {"config.yaml", "provenance.json", "checkpoint.npz", "history.csv"}
-    assert {path.name for path in (here / "run").iterdir()} == names | {"timing.csv"}
+    names |= {"timing.csv", LOCK}
+    assert {path.name for path in (here / "run").iterdir()} == names
     assert (n_records(here / "run"), n_rows(here / "run")) == (1, 1)
     assert run(["--resume", "run"]) == 0
     assert_reproduced(here / "run", here / "whole")

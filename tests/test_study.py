@@ -1,0 +1,618 @@
+"""`python -m evolution.study`: every run as if alone, whatever becomes of others."""
+
+import json
+import math
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from epuck_mj import files
+from epuck_mj.errors import UserError
+from evolution import champion, execution, jobs, results
+from evolution import study as module
+from evolution.config import load_config
+from evolution.execution import Means
+from evolution.held_out import Judge
+from evolution.jobs import Event, Job, carry_out, failure_log, failure_of
+from evolution.run import run
+from evolution.run_directory import LOCK, RunDirectory
+from evolution.study import study
+
+TIMEOUT = 120
+"""Seconds for what takes a few on a machine that does nothing else."""
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+
+SMALL = "steps: 20\ntrials: 2\nevaluations: 20\n"
+EXPERIMENTS = {
+    "one": "{algorithm: differential_evolution, strategy: best, population: 10, "
+    "scale: 0.8, crossover: 1.0}",
+    "two": "{algorithm: genetic_algorithm, population: 10}",
+}
+SEEDS = (1, 2)
+RUNS = [(name, seed) for seed in SEEDS for name in EXPERIMENTS]
+REPRODUCED = ("history.csv", "champion.json")
+
+LONG = 300
+"""Evaluations of runs that there is time to interrupt, in 30 generations."""
+
+UNHURRIED = """
+import math, time
+from epuck_mj.command_line import main
+from evolution import champion, execution, results, run_directory, study
+from evolution.held_out import Judge
+
+# in the processes of the runs as well, which import this file
+test, save = Judge.test, run_directory.RunDirectory.save
+
+def saved(self, *arguments):
+    save(self, *arguments)
+    time.sleep(0.05)
+
+champion.N_VALIDATION = 5
+Judge.test = lambda self, policy: test(self, policy, 5)
+results._draw_fitness = results._show = lambda *_: None
+execution.SAVING_SHARE = math.inf
+run_directory.RunDirectory.save = saved
+
+if __name__ == "__main__":
+    main(study.study)
+"""
+"""`evolution.study` that saves every generation and leaves time to look at it."""
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A working directory with the experiments and a study of them."""
+    monkeypatch.chdir(tmp_path)
+    write_study(tmp_path)
+    return tmp_path
+
+
+def write_study(folder: Path, evaluations: int = 20) -> None:
+    for name, optimizer in EXPERIMENTS.items():
+        (folder / f"{name}.yaml").write_text(f"{SMALL}optimizer: {optimizer}\n")
+    (folder / "mine.yaml").write_text(
+        f"experiments: [one.yaml, two.yaml]\ncommon: {{evaluations: {evaluations}}}\n"
+    )
+    (folder / "unhurried.py").write_text(UNHURRIED)
+
+
+def make_quick(patch: pytest.MonkeyPatch) -> None:
+    """As in `UNHURRIED`, but without waiting."""
+    test = Judge.test
+    patch.setattr(Judge, "test", lambda self, policy: test(self, policy, 5))
+    patch.setattr(champion, "N_VALIDATION", 5)
+    patch.setattr(results, "_draw_fitness", lambda *_: None)
+    patch.setattr(results, "_show", lambda *_: None)
+
+
+def assert_reproduced(directory: Path, reference: Path) -> None:
+    for name in REPRODUCED:
+        assert (directory / name).read_bytes() == (reference / name).read_bytes(), name
+
+
+def written(directory: Path) -> dict[str, int]:
+    """When everything below was last written."""
+    return {str(path): path.stat().st_mtime_ns for path in directory.rglob("*")}
+
+
+def n_records(directory: Path) -> int:
+    """Generations in the checkpoint, which can be read at any moment."""
+    if not (directory / "checkpoint.npz").exists():
+        return 0
+    return len(files.read_arrays(directory / "checkpoint.npz")["records"])
+
+
+def provenance(directory: Path) -> dict:
+    return json.loads((directory / "provenance.json").read_text())
+
+
+# in this process
+
+
+class Carried:
+    """Carries jobs out one after the other, here, and remembers which."""
+
+    def __init__(self):
+        self.jobs: list[Job] = []
+
+    def __call__(
+        self, jobs: Sequence[Job], means: Means, n_processes: int
+    ) -> Iterator[Event]:
+        for job in jobs:
+            self.jobs.append(job)
+            carry_out(job, means, lambda evaluations: None)
+            yield Event(job, ended=True)
+
+
+@pytest.fixture
+def carried(monkeypatch) -> Carried:
+    """No processes, pictures, or long tests."""
+    make_quick(monkeypatch)
+    carried = Carried()
+    monkeypatch.setattr(module, "carry_out_side_by_side", carried)
+    monkeypatch.setattr(module, "_measure_yardstick", lambda *_: None)
+    return carried
+
+
+# processes
+
+
+@contextmanager
+def started(cwd: Path, *command: str) -> Iterator[subprocess.Popen[str]]:
+    """A python process; neither it nor its children outlive the block."""
+    process = subprocess.Popen(
+        [sys.executable, *command],
+        cwd=cwd,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        yield process
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+
+
+def finish(cwd: Path, *command: str) -> subprocess.CompletedProcess[str]:
+    with started(cwd, *command) as process:
+        stdout, stderr = process.communicate(timeout=TIMEOUT)
+    return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
+
+
+def wait_for(moment: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + TIMEOUT
+    while not moment():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def command_line(pid: int) -> str:
+    """Empty for a process that has ended, whether or not somebody asked for it."""
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text()
+    except OSError:
+        return ""
+
+
+def run_processes(pid: int) -> list[int]:
+    """The processes of the runs of a study's process."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return [int(each) for each in children if "spawn_main" in command_line(int(each))]
+
+
+@pytest.fixture
+def finished(here, carried, capsys):
+    """A study of which all is done."""
+    assert study(["mine.yaml", "--seeds", "1-2", "--output", "out"]) == 0
+    assert [(job.name, job.config.seed) for job in carried.jobs] == RUNS
+    carried.jobs.clear()
+    capsys.readouterr()
+    return here / "out"
+
+
+def unfinish(directory: Path) -> None:
+    """As if the run had been killed before it chose its champion."""
+    (directory / "champion.json").unlink()
+    text = json.dumps({**provenance(directory), "finished": None})
+    (directory / "provenance.json").write_text(text)
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    """Longer runs of experiment one, each alone, that nothing interrupted."""
+    cwd = tmp_path_factory.mktemp("reference")
+    write_study(cwd)
+    with pytest.MonkeyPatch.context() as patch:
+        make_quick(patch)
+        for seed in SEEDS:
+            argv = [str(cwd / "one.yaml"), "--seed", str(seed)]
+            output = ["--output", str(cwd / f"seed-{seed}")]
+            assert run([*argv, "--evaluations", str(LONG), *output]) == 0
+    return cwd
+
+
+# what a study leaves behind
+
+
+@pytest.mark.slow
+def test_every_run_is_the_same_as_alone(here, monkeypatch):
+    argv = ["mine.yaml", "--seeds", "1-2", "--output", "out", "--jobs", "2"]
+    process = finish(here, "unhurried.py", *argv)
+    assert (process.returncode, process.stderr) == (0, "")
+    make_quick(monkeypatch)
+    out = here / "out"
+    for name, seed in RUNS:
+        alone = here / f"{name}-{seed}"
+        argv = [f"{name}.yaml", "--seed", str(seed), "--output", str(alone)]
+        assert run(argv) == 0
+        there = out / name / f"seed-{seed}"
+        assert_reproduced(there, alone)
+        assert load_config(there / "config.yaml") == load_config(alone / "config.yaml")
+        assert provenance(there)["finished"]
+        # no more and no less than a run leaves by itself
+        assert {path.name for path in there.iterdir()} == {
+            path.name for path in alone.iterdir()
+        }
+    assert not [path for path in out.rglob(".*") if path.name != LOCK]
+    names = {path.name for path in out.iterdir()}
+    assert names == {"one", "two", "study.yaml", "wall-follower.json"}
+    # a line for every run
+    *lines, summary, report = process.stdout.splitlines()
+    pattern = r"(\d)/4 (\w+) seed (\d): held-out .* crash\); stored \d+\.\d"
+    matches = [re.fullmatch(pattern, line) for line in lines]
+    found = [match.groups() for match in matches if match]
+    assert [count for count, _, _ in found] == ["1", "2", "3", "4"]
+    assert sorted((name, int(seed)) for _, name, seed in found) == sorted(RUNS)
+    assert re.fullmatch(r"4 of 4 runs are finished, \d+\.\d min", summary)
+    assert report.startswith("Report: ")
+    assert report.endswith(" -m evolution.report out")
+
+
+def test_what_is_done_is_skipped(finished, carried, capsys):
+    before = written(finished / "one") | written(finished / "two")
+    assert study(["mine.yaml", "--seeds", "1-2", "--output", "out"]) == 0
+    assert carried.jobs == []
+    assert written(finished / "one") | written(finished / "two") == before
+    first, summary, _ = capsys.readouterr().out.splitlines()
+    assert first == "4 of 4 runs were finished already"
+    assert summary.startswith("4 of 4 runs are finished, ")
+
+
+def test_what_is_not_done_is(finished, carried, capsys):
+    expected = (finished / "two" / "seed-1" / "champion.json").read_bytes()
+    unfinish(finished / "two" / "seed-1")
+    kept = written(finished / "one" / "seed-2")
+    assert study(["mine.yaml", "--seeds", "1-3", "--output", "out"]) == 0
+    # all experiments of a seed before the next
+    assert list(map(str, carried.jobs)) == ["two seed 1", "one seed 3", "two seed 3"]
+    assert written(finished / "one" / "seed-2") == kept
+    assert (finished / "two" / "seed-1" / "champion.json").read_bytes() == expected
+    assert provenance(finished / "two" / "seed-1")["finished"]
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "3 of 6 runs were finished already"
+    assert [line.split(":")[0] for line in lines[1:4]] == [
+        "4/6 two seed 1",
+        "5/6 one seed 3",
+        "6/6 two seed 3",
+    ]
+
+
+def test_some_experiments_now_and_the_others_later(here, carried):
+    argv = ["mine.yaml", "--seeds", "4", "--output", "out"]
+    assert study([*argv, "--experiments", "two"]) == 0
+    assert study(argv) == 0
+    assert list(map(str, carried.jobs)) == ["two seed 4", "one seed 4"]
+    assert carried.jobs[0].argv == (*argv, "--experiments", "two")
+    assert provenance(here / "out" / "one" / "seed-4")["argv"] == argv
+
+
+def test_racing_changes_nothing(here, carried):
+    argv = ["mine.yaml", "--seeds", "1", "--experiments", "one"]
+    assert study([*argv, "--output", "with"]) == 0
+    assert study([*argv, "--output", "without", "--no-racing"]) == 0
+    runs = [here / name / "one" / "seed-1" for name in ("with", "without")]
+    assert_reproduced(*runs)
+
+
+# bad input
+
+
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        ([], ("study",)),
+        (["mine.yaml"], ("--output",)),
+        (["nope", "--output", "out"], ("no study 'nope'", "paper")),
+        (["one.yaml", "--output", "out"], ("unknown key 'steps'",)),
+        (["mine.yaml", "--output", "out", "--seeds", "3-1"], ("'3-1'",)),
+        (["mine.yaml", "--output", "out", "--jobs", "-1"], ("0 to 1024, got -1",)),
+        (["mine.yaml", "--output", "out", "--jobs", "many"], ("--jobs", "'many'")),
+        (
+            ["mine.yaml", "--output", "out", "--experiments", "one,three"],
+            ("no experiment 'three'", "available: one, two"),
+        ),
+        (["mine.yaml", "--output", "out", "--split"], ("--cluster",)),
+        (["mine.yaml", "--output", "one.yaml"], ("not a directory",)),
+        (["mine.yaml", "--output", "."], ("holds no study",)),
+    ],
+)
+def test_bad_arguments_are_refused(argv, words, here, capfd):
+    before = written(here)
+    with pytest.raises(UserError) as info:
+        study(argv)
+    message = str(info.value)
+    assert "\n" not in message
+    for word in words:
+        assert word in message
+    assert written(here) == before
+    assert capfd.readouterr() == ("", "")
+
+
+def test_bad_input_ends_a_process_with_one_line_and_status_2(here):
+    process = finish(here, "-m", "evolution.study", "nope", "--output", "out")
+    assert (process.returncode, process.stdout) == (2, "")
+    assert re.fullmatch(r"error: no study 'nope'.*\n", process.stderr)
+    assert not (here / "out").exists()
+
+
+def test_another_study_is_refused(here, carried):
+    argv = ["mine.yaml", "--seeds", "1", "--output", "out"]
+    assert study([*argv, "--experiments", "two"]) == 0
+    write_study(here, evaluations=30)
+    before = written(here)
+    with pytest.raises(UserError, match=r"'two' differs in: evaluations \(stored 20"):
+        study(argv)
+    assert written(here) == before
+
+
+# failures
+
+
+@pytest.mark.slow
+def test_a_run_that_fails_does_not_stop_the_others(finished, here):
+    # another config, a file, a damaged checkpoint, and one to be done
+    other = finished / "one" / "seed-1"
+    unfinish(other)
+    text = (other / "config.yaml").read_text()
+    (other / "config.yaml").write_text(text.replace("trials: 2", "trials: 3"))
+    shutil.rmtree(finished / "two" / "seed-1")
+    (finished / "two" / "seed-1").write_text("years of work")
+    damaged = finished / "one" / "seed-2" / "checkpoint.npz"
+    unfinish(damaged.parent)
+    damaged.write_bytes(damaged.read_bytes()[:-100])
+    shutil.rmtree(finished / "two" / "seed-2")
+    before = written(other) | written(damaged.parent)
+    argv = ["mine.yaml", "--seeds", "1-2", "--output", "out", "--jobs", "2"]
+    process = finish(here, "unhurried.py", *argv)
+    assert process.returncode == 1
+    *failures, summary = process.stderr.splitlines()
+    failed = {line.split(" failed: ")[0]: line for line in failures}
+    assert set(failed) == {"one seed 1", "one seed 2", "two seed 1"}
+    assert "another config; these keys differ: " in failed["one seed 1"]
+    assert "trials (stored 3, got 2)" in failed["one seed 1"]
+    assert "out/one/seed-2/checkpoint.npz" in failed["one seed 2"]
+    assert "two/seed-1" in failed["two seed 1"]
+    assert set(summary.removeprefix("failed: ").split(", ")) == set(failed)
+    first, second, _ = process.stdout.splitlines()
+    assert first.startswith("1/4 two seed 2: ")
+    assert second.startswith("1 of 4 runs are finished, ")
+    # what failed is as it was
+    after = written(other) | written(damaged.parent)
+    assert {path: after[path] for path in before} == before
+    assert (finished / "two" / "seed-1").read_text() == "years of work"
+
+
+def test_what_is_nobodys_to_put_right_leaves_a_log(here):
+    config = load_config(here / "one.yaml")
+    job = Job("one", config, here / "one" / "seed-1", ())
+    (here / "one").mkdir()
+    assert failure_of(job, UserError("no room for a start")) == "no room for a start"
+    assert not failure_log(job.directory).exists()
+    try:
+        raise ValueError("this\nand that")
+    except ValueError as error:
+        message = failure_of(job, error)
+    log = here / "one" / "seed-1.failure.txt"
+    assert message == f"ValueError: this and that (see {log})"
+    assert log.read_text().startswith("Traceback")
+    assert 'raise ValueError("this' in log.read_text()
+
+
+@linux
+@pytest.mark.slow
+def test_a_run_killed_alone_is_reported_and_the_next_call_completes_it(
+    here, carried, reference
+):
+    write_study(here, evaluations=LONG)
+    argv = ["mine.yaml", "--experiments", "one", "--seeds", "1-2", "--output", "out"]
+    one, two = (here / "out" / "one" / f"seed-{seed}" for seed in SEEDS)
+    with started(here, "unhurried.py", *argv, "--jobs", "1") as process:
+        wait_for(lambda: n_records(one) > 2)
+        (victim,) = run_processes(process.pid)
+        os.kill(victim, signal.SIGKILL)
+        stdout, stderr = process.communicate(timeout=TIMEOUT)
+    assert process.returncode == 1
+    assert stderr.splitlines() == [
+        "one seed 1 failed: its process was killed by SIGKILL",
+        "failed: one seed 1",
+    ]
+    assert stdout.startswith("1/2 one seed 2: ")
+    assert_reproduced(two, reference / "seed-2")
+    assert provenance(one)["finished"] is None
+    kept, done = written(two), n_records(one)
+    assert study(argv) == 0
+    assert list(map(str, carried.jobs)) == ["one seed 1"]
+    assert_reproduced(one, reference / "seed-1")
+    assert written(two) == kept
+    # gone on with, not begun again; the kill may have cost the row of a generation
+    assert done > 2
+    rows = (one / "timing.csv").read_text().splitlines()[1:]
+    timed = [int(row.split(",")[0]) for row in rows]
+    assert timed == sorted(set(timed))
+    assert len(timed) >= LONG // 10 - 1
+    assert len(provenance(one)["resumed"]) == 1
+
+
+@contextmanager
+def interrupted(
+    here: Path, seeds: Sequence[int]
+) -> Iterator[tuple[subprocess.Popen[str], list[int], list[str]]]:
+    """A study in the midst of its runs, their processes, and what was typed."""
+    write_study(here, evaluations=LONG)
+    argv = ["mine.yaml", "--experiments", "one", "--output", "out"]
+    argv += ["--seeds", ",".join(map(str, seeds)), "--jobs", "2"]
+    directories = [here / "out" / "one" / f"seed-{seed}" for seed in seeds]
+    with started(here, "unhurried.py", *argv) as process:
+        wait_for(lambda: all(n_records(each) > 1 for each in directories))
+        children = run_processes(process.pid)
+        assert len(children) == len(seeds)
+        yield process, children, argv
+
+
+def assert_completed(
+    here: Path, argv: Sequence[str], seeds: Sequence[int], reference: Path
+) -> None:
+    directories = [here / "out" / "one" / f"seed-{seed}" for seed in seeds]
+    assert all(n_records(each) < LONG // 10 for each in directories)
+    assert study(argv) == 0
+    for seed, directory in zip(seeds, directories, strict=True):
+        assert_reproduced(directory, reference / f"seed-{seed}")
+        assert len(provenance(directory)["resumed"]) == 1
+    assert not [*here.rglob("*.failure.txt")]
+
+
+@linux
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("signum", "send", "status", "seeds"),
+    [
+        # a terminal sends it to all of them
+        (signal.SIGINT, os.killpg, 130, (1, 2)),
+        (signal.SIGINT, os.kill, 130, (1,)),
+        (signal.SIGTERM, os.kill, 143, (2,)),
+    ],
+    ids=["Ctrl-C", "SIGINT", "SIGTERM"],
+)
+def test_a_signal_ends_all_and_says_how_to_go_on(
+    signum, send, status, seeds, here, carried, reference
+):
+    with interrupted(here, seeds) as (process, children, typed):
+        send(process.pid, signum)
+        stdout, stderr = process.communicate(timeout=TIMEOUT)
+        assert not any(map(command_line, children))
+    assert process.returncode == status
+    assert stdout == ""
+    match = re.fullmatch(r"Interrupted; go on with: (.*)\n", stderr)
+    assert match, stderr
+    python, *arguments = shlex.split(match[1])
+    assert Path(python).name.startswith("python")
+    assert arguments == ["-m", "evolution.study", *typed]
+    assert_completed(here, typed, seeds, reference)
+
+
+@linux
+@pytest.mark.slow
+def test_runs_end_when_their_study_is_killed(here, carried, reference):
+    with interrupted(here, SEEDS) as (process, children, typed):
+        process.kill()
+        wait_for(lambda: not any(map(command_line, children)))
+        _, stderr = process.communicate(timeout=TIMEOUT)
+    assert process.returncode == -signal.SIGKILL
+    assert stderr == ""
+    assert_completed(here, typed, SEEDS, reference)
+
+
+# one process in a directory
+
+HOLD = """
+import sys, time
+from filelock import FileLock
+
+with FileLock(sys.argv[1]):
+    print("held", flush=True)
+    time.sleep(float(sys.argv[2]))
+"""
+
+
+@contextmanager
+def held(directory: Path, seconds: float = TIMEOUT) -> Iterator[subprocess.Popen[str]]:
+    """Another process works in the directory for so long."""
+    with started(directory, "-c", HOLD, str(directory / LOCK), str(seconds)) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "held\n"
+        yield process
+
+
+def test_a_second_process_in_a_run_directory_gets_one_line(here, carried, monkeypatch):
+    argv = ["one.yaml", "--output", "run"]
+    assert run(argv) == 0
+    directory = here / "run"
+    text = json.dumps({**provenance(directory), "finished": None})
+    (directory / "provenance.json").write_text(text)
+    config = load_config(directory / "config.yaml")
+    job = Job("one", config, directory, ())
+    monkeypatch.setattr(jobs, "PATIENCE", 0.2)
+    with held(directory) as process:
+        before = written(directory)
+        for act in (
+            lambda: run(["--resume", "run"]),
+            lambda: carry_out(job, Means(), lambda evaluations: None),
+        ):
+            with pytest.raises(UserError) as info:
+                act()
+            message = str(info.value)
+            assert message.startswith("another process is working in '")
+            assert message.endswith("run': wait for it, or stop it")
+        assert written(directory) == before
+        # however it ends, the directory is free
+        process.kill()
+        process.wait(TIMEOUT)
+        assert run(["--resume", "run"]) == 0
+
+
+def test_a_process_about_to_leave_is_waited_for(tmp_path):
+    with held(tmp_path, 0.3), RunDirectory(tmp_path).locked(patience=TIMEOUT):
+        pass
+
+
+# checkpoints
+
+
+def test_checkpoints_take_a_small_share_of_the_time(here, carried, monkeypatch):
+    """By a clock on which a generation takes 1 s and a checkpoint 2 s."""
+    now, saves = 0.0, []
+
+    class Clock:
+        @staticmethod
+        def monotonic() -> float:
+            return now
+
+    class Directory(RunDirectory):
+        def save(self, experiment, seconds):
+            nonlocal now
+            super().save(experiment, seconds)
+            saves.append((len(experiment.records), list(seconds)))
+            now += 2
+
+    config = load_config(here / "one.yaml").model_copy(update={"evaluations": 1000})
+    evolution = execution.Run(config, Directory(here / "run"), Means(), ())
+    monkeypatch.setattr(execution, "time", Clock)
+    evaluate = evolution.experiment.engine.run
+
+    def slow(*arguments):
+        nonlocal now
+        now += 1
+        return evaluate(*arguments)
+
+    monkeypatch.setattr(evolution.experiment.engine, "run", slow)
+    evolution.start()
+    assert len(list(evolution.evolve())) == 100
+    # the first, so that there is one, and the last; 5 % of 41 s is more than 2 s
+    assert [records for records, _ in saves] == [1, 42, 83, 100]
+    assert [seconds for _, seconds in saves] == [
+        [1.0],
+        41 * [1.0],
+        41 * [1.0],
+        17 * [1.0],
+    ]
+    rows = (here / "run" / "timing.csv").read_text().splitlines()[1:]
+    assert [row.split(",")[:2] for row in rows] == [
+        [str(i), "1.000"] for i in range(100)
+    ]
+    assert math.isclose(execution.SAVING_SHARE, 0.05)

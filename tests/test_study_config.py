@@ -1,0 +1,321 @@
+"""Studies: what they are read from, how they are stored, and what joins them."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+import yaml
+
+from epuck_mj import files
+from epuck_mj.errors import UserError
+from epuck_mj.model import MODELS
+from evolution.config import find_config, load_config
+from evolution.optimizer import OPTIMIZERS
+from evolution.study_config import StudyConfig, find_study, parse_seeds
+from evolution.study_directory import StudyDirectory
+
+SHIPPED = ("paper", "quick", "wheels")
+GA = "optimizer: {algorithm: genetic_algorithm}\n"
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty directory that is the working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def study(text: str) -> StudyConfig:
+    """A study of that text, from a file in the working directory."""
+    Path("study.yaml").write_text(text)
+    return StudyConfig.load(Path("study.yaml"))
+
+
+def refused(act, *arguments) -> str:
+    """The one line that a user gets."""
+    with pytest.raises(UserError) as info:
+        act(*arguments)
+    message = str(info.value)
+    assert message.strip()
+    assert "\n" not in message
+    return message
+
+
+# seeds
+
+
+@pytest.mark.parametrize(
+    ("text", "seeds"),
+    [
+        ("7", [7]),
+        ("0", [0]),
+        ("1-3", [1, 2, 3]),
+        ("4-4", [4]),
+        ("1,3,5-8", [1, 3, 5, 6, 7, 8]),
+        ("9, 2-3 ,1", [1, 2, 3, 9]),
+        ("007", [7]),
+    ],
+)
+def test_seeds(text, seeds):
+    assert parse_seeds(text) == seeds
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "1-30 or 1,3,5-8, got ''"),
+        ("-", "got '-'"),
+        ("-1", "got '-1'"),
+        ("1-", "got '1-'"),
+        ("1--3", "got '1--3'"),
+        ("1-2-3", "got '1-2-3'"),
+        ("1,,2", "got '1,,2'"),
+        ("1 2", "got '1 2'"),
+        ("1.5", "got '1.5'"),
+        ("one", "got 'one'"),
+        ("²", "got '²'"),
+        ("٣", "got '٣'"),
+        ("3-1", "from a lower to a higher one, at most 10000, got '3-1'"),
+        ("1-10001", "at most 10000, got '1-10001'"),
+        ("1-999999999999999999", "at most 10000"),
+        (19 * "9", "expected seeds as "),
+        (5000 * "9", "expected seeds"),
+        ("1,2,1", "every seed once, got '1,2,1'"),
+        ("1-5,3", "every seed once, got '1-5,3'"),
+    ],
+)
+def test_other_seeds_are_refused(text, words):
+    assert words in refused(parse_seeds, text)
+
+
+# reading
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_studies_load(name):
+    config = StudyConfig.load(find_study(name))
+    assert list(config.experiments)[:3] == ["de-best", "de-rand", "ga"]
+    assert set(config.experiments) <= set(OPTIMIZERS)
+    for experiment, each in config.experiments.items():
+        assert each.optimizer == load_config(find_config(experiment)).optimizer
+        assert each.evaluations <= 30_000
+        assert each.robot == ("epuck" if name == "wheels" else "epuck_planar")
+
+
+def test_what_experiments_share_wins(here):
+    (here / "mine.yaml").write_text("steps: 7\ntrials: 3\n" + GA)
+    config = study("experiments: [ga, mine.yaml]\ncommon: {steps: 9, seed: 4}")
+    assert list(config.experiments) == ["ga", "mine"]
+    shipped = load_config(find_config("ga")).model_dump()
+    assert config.experiments["ga"].model_dump() == shipped | {"steps": 9, "seed": 4}
+    assert (config.experiments["mine"].steps, config.experiments["mine"].trials) == (
+        9,
+        3,
+    )
+
+
+def test_order_is_kept(here):
+    config = study("experiments: [ga, de-rand, de-best]")
+    assert list(config.experiments) == ["ga", "de-rand", "de-best"]
+    assert list(StudyConfig.load(Path("study.yaml")).experiments) == list(
+        config.experiments
+    )
+
+
+def test_an_own_robot_means_the_same_from_anywhere(here):
+    shutil.copy(MODELS / "epuck.xml", here / "mine.xml")
+    config = study("experiments: [ga]\ncommon: {robot: mine.xml}")
+    assert config.experiments["ga"].robot == str(here / "mine.xml")
+    assert config.experiments["ga"].arena == "arena"
+
+
+def test_a_run_has_its_own_seed_and_nothing_else(here):
+    config = study("experiments: [ga]")
+    one = config.with_seed("ga", 12)
+    assert one.model_dump() == config.experiments["ga"].model_dump() | {"seed": 12}
+    assert config.experiments["ga"].seed == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("experiments: [", ("study.yaml' is not YAML",)),
+        ("", ("expected a mapping", "NoneType")),
+        ("- ga\n", ("expected a mapping", "list")),
+        ("experiment: [ga]", ("unknown key 'experiment'; available: experiments, c",)),
+        ("{1: 2}", ("unknown key '1'",)),
+        ("common: {steps: 3}", ("expected 'experiments', a list", "got None")),
+        ("experiments: ga", ("expected 'experiments', a list", "got ga")),
+        ("experiments: []", ("expected 'experiments', a list", "got []")),
+        ("experiments: [ga, nope]", ("no experiment 'nope'", "de-best, de-rand, ga")),
+        ("experiments: [paper]", ("no experiment 'paper'",)),
+        ("experiments: [study.yaml]", ("unknown key 'experiments'",)),
+        ("experiments: [3]", ("no experiment '3'",)),
+        ("experiments: [ga, ga]", ("two experiments are called 'ga'",)),
+        ("experiments: [ga, ga.yaml]", ("two experiments are called 'ga'",)),
+        ("experiments: [ga]\ncommon: 3", ("expected 'common', a mapping, got 3",)),
+        ("experiments: [ga]\ncommon: {stps: 3}", ("', common: unknown key 'stps'",)),
+        ("experiments: [ga]\ncommon: {steps: x}", ("common: steps: ", "got 'x'")),
+        ("experiments: [ga]\ncommon: {1: 2}", ("', common: ",)),
+        (
+            "experiments: [ga]\ncommon: {optimizer: {population: 10}}",
+            ("', common: optimizer: expected a mapping with 'algorithm'",),
+        ),
+    ],
+)
+def test_a_bad_study_is_refused(text, words, here):
+    (here / "ga.yaml").write_text(GA)
+    message = refused(study, text)
+    for word in words:
+        assert word in message
+
+
+def test_a_study_is_shipped_or_a_file(here):
+    (here / "mine.yaml").write_text("experiments: [ga]")
+    assert find_study("mine.yaml") == Path("mine.yaml")
+    for name in ("nope", "ga", "", ".", 300 * "a", "a\0b"):
+        message = refused(find_study, name)
+        assert message.startswith(f"no study '{name}'")
+        assert message.endswith(", ".join(SHIPPED))
+
+
+# choosing and joining
+
+
+def test_some_of_the_experiments(here):
+    config = study("experiments: [ga, de-rand, de-best]")
+    some = config.only(["de-best", "ga"])
+    assert list(some.experiments) == ["de-best", "ga"]
+    assert some.experiments["ga"] == config.experiments["ga"]
+    message = refused(config.only, ["ga", "gb"])
+    assert message == (
+        "no experiment 'gb' in the study; available: ga, de-rand, de-best"
+    )
+
+
+def test_more_experiments_join(here):
+    stored = study("experiments: [de-rand, ga]")
+    both = stored.merged(study("experiments: [ga, de-best]"), Path("out"))
+    assert list(both.experiments) == ["de-rand", "ga", "de-best"]
+    assert both.experiments["de-best"] == load_config(find_config("de-best"))
+
+
+def test_an_experiment_that_has_changed_does_not(here):
+    stored = study("experiments: [de-best, ga]\ncommon: {steps: 5}")
+    other = study("experiments: [ga, de-rand]\ncommon: {steps: 6, trials: 2}")
+    assert refused(stored.merged, other, Path("out")) == (
+        "'out' is a study of another config; experiment 'ga' differs in: "
+        "trials (stored 5, got 2), steps (stored 5, got 6)"
+    )
+
+
+def test_stored_and_read_back(here):
+    config = study("experiments: [ga, de-best, cma-es]\ncommon: {steps: 5}")
+    Path("stored.yaml").write_text(config.to_yaml())
+    back = StudyConfig.from_yaml(Path("stored.yaml"))
+    assert list(back.experiments.items()) == list(config.experiments.items())
+    assert back.to_yaml() == config.to_yaml()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (None, "cannot read"),
+        ("", "expected a mapping"),
+        ("{}", "expected experiments, got none"),
+        ("ga: 3", "stored.yaml', ga: "),
+        ("ga: {steps: 3}", "stored.yaml', ga: key 'optimizer' is missing"),
+        ("ga: {stps: 3, " + GA.strip() + "}", "stored.yaml', ga: unknown key 'stps'"),
+        ("ga: [", "is not YAML"),
+    ],
+)
+def test_a_damaged_one_is_refused(content, words, here):
+    if content is not None:
+        Path("stored.yaml").write_text(content)
+    assert words in refused(StudyConfig.from_yaml, Path("stored.yaml"))
+
+
+# the directory
+
+
+def test_a_new_directory_holds_the_study(here):
+    config = study("experiments: [ga, de-best]")
+    directory = StudyDirectory(here / "deep" / "out")
+    directory.open(config)
+    assert [path.name for path in directory.path.iterdir()] == ["study.yaml"]
+    assert directory.stored_config() == config
+    assert directory.run("ga", 3).path == directory.path / "ga" / "seed-3"
+    before = directory.config.read_bytes()
+    # again, and with less
+    directory.open(config.only(["de-best"]))
+    assert directory.config.read_bytes() == before
+    directory.open(study("experiments: [de-rand]"))
+    assert list(directory.stored_config().experiments) == ["ga", "de-best", "de-rand"]
+
+
+def test_an_empty_directory_is_as_good_as_none(here):
+    (here / "out").mkdir()
+    StudyDirectory(Path("out")).open(study("experiments: [ga]"))
+    assert files.is_file(here / "out" / "study.yaml")
+
+
+def test_what_a_killed_writer_left_is_in_nobodys_way(here):
+    (here / "out").mkdir()
+    (here / "out" / ".study.yaml-b2q7x_1c").write_text("ga:")
+    StudyDirectory(Path("out")).open(study("experiments: [ga]"))
+    assert files.is_file(here / "out" / "study.yaml")
+
+
+def test_seeds_are_those_of_which_there_is_a_directory(here):
+    for name in ("seed-10", "seed-2", "seed-x", "seed-", "other", "seed-3.failure.txt"):
+        (here / "ga" / name).mkdir(parents=True)
+    (here / "ga" / "seed-4").write_text("")
+    assert StudyDirectory(here).seeds("ga") == [2, 10]
+    assert StudyDirectory(here).seeds("de-best") == []
+
+
+def test_what_is_no_study_is_refused_and_left_alone(here):
+    config = study("experiments: [ga]")
+    (here / "file").write_text("years of work")
+    (here / "thesis").mkdir()
+    (here / "thesis" / "thesis.tex").write_text("years of work")
+    for name, words in [
+        ("file", "output 'file' is not a directory"),
+        ("file/deeper", "cannot write"),
+        ("thesis", "output 'thesis' is not empty and holds no study"),
+        (300 * "a", "cannot write"),
+    ]:
+        assert words in refused(StudyDirectory(Path(name)).open, config)
+    assert (here / "file").read_text() == "years of work"
+    assert [path.name for path in (here / "thesis").iterdir()] == ["thesis.tex"]
+
+
+def test_another_study_is_refused_and_left_alone(here):
+    directory = StudyDirectory(Path("out"))
+    directory.open(study("experiments: [ga, de-best]"))
+    before = directory.config.read_bytes()
+    other = study("experiments: [de-best, de-rand]\ncommon: {v_max: 0.1}")
+    message = refused(directory.open, other)
+    assert message.startswith("'out' is a study of another config")
+    assert "experiment 'de-best' differs in: v_max (stored " in message
+    assert directory.config.read_bytes() == before
+
+
+def test_a_directory_without_a_study_has_none_to_read(here):
+    message = refused(StudyDirectory(here).stored_config)
+    assert "is not a study" in message
+    assert "python -m evolution.study" in message
+
+
+@pytest.mark.parametrize("content", ["", "ga: [", "ga: {steps: many}"])
+def test_a_damaged_study_is_refused_and_kept(content, here):
+    (here / "out").mkdir()
+    (here / "out" / "study.yaml").write_text(content)
+    message = refused(StudyDirectory(Path("out")).open, study("experiments: [ga]"))
+    assert "out/study.yaml" in message
+    assert (here / "out" / "study.yaml").read_text() == content
+
+
+def test_the_stored_study_is_plain_yaml(here):
+    content = yaml.safe_load(study("experiments: [ga]").to_yaml())
+    assert content["ga"]["optimizer"]["algorithm"] == "genetic_algorithm"
