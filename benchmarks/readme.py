@@ -7,7 +7,7 @@ from pathlib import Path
 from epuck_mj import files
 from epuck_mj.command_line import main, parse
 from epuck_mj.errors import UserError
-from evolution.reproduction import runs_table
+from evolution.report.reproduction import runs_table
 from evolution.study_data import load_study
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -10,8 +10,8 @@ from pathlib import Path
 from epuck_mj import files
 from epuck_mj.command_line import command, main, parse
 from epuck_mj.errors import UserError
-from evolution.report import report
-from evolution.reproduction import reproduction
+from evolution.report.command import report
+from evolution.report.reproduction import reproduction
 from evolution.study import study
 from evolution.study_data import load_study
 

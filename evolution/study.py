@@ -20,6 +20,7 @@ from evolution.interruption import Interrupted, interruptible
 from evolution.jobs import Event, Job, carry_out_side_by_side
 from evolution.results import judges, scores
 from evolution.study_config import StudyConfig, find_study, parse_seeds
+from evolution.study_data import YARDSTICK
 from evolution.study_directory import StudyDirectory
 
 MODULE = "evolution.study"
@@ -87,13 +88,16 @@ def study(argv: Sequence[str]) -> int:
         with interruptible():
             events = _shown(everything, jobs, _events(jobs, options))
             failed.extend(event.job for event in events if event.failure is not None)
+            try:
+                _measure_yardstick(directory, config)
+            except UserError as error:
+                print(f"{YARDSTICK} could not be tested: {error}", file=sys.stderr)
     except Interrupted as interruption:
         print(
             f"Interrupted; go on with: {command(MODULE, *argv)}",
             file=sys.stderr,
         )
         return interruption.status
-    _measure_yardstick(directory, config)
     done = len(everything) - len(failed)
     minutes = (time.monotonic() - started) / 60
     print(f"{done} of {len(everything)} runs are finished, {minutes:.1f} min")

@@ -13,9 +13,10 @@ LAYERS = [
     {"sensors", "motors", "fitness", "controller", "files", "command_line"},
     {"control", "wall_follower", "model", "colors"},
     {"simulation", "geometry"},
-    {"starts", "outline", "trajectory"},
-    {"tasks", "recording"},
-    {"render"},
+    {"starts", "outline", "trajectory", "tracks", "clearance"},
+    {"tasks", "recording", "wall_loops"},
+    {"render", "metrics"},
+    {"behaviour_classes"},
 ]
 """Modules of epuck_mj; each imports from layers above its own here only."""
 
@@ -31,14 +32,24 @@ NUMPY_ONLY = {
     "evolution/optimizer.py",
     "evolution/differential_evolution.py",
     "evolution/genetic_algorithm.py",
+    "evolution/random_search.py",
+    "evolution/evolution_strategy.py",
 }
 """Where numpy is the only package from outside."""
 
 ALLOWED_IN = {
+    "cmaes": "evolution/cma_es.py",
+    "dask": "evolution/cluster/",
+    "distributed": "evolution/cluster/",
     "rerun": "epuck_mj/recording/",
     "serial": "epuck_mj/bridge/",
-    "matplotlib": ("evolution/figures.py", "epuck_mj/render.py"),
-    "yaml": ("evolution/config.py", "evolution/run_directory.py"),
+    "contourpy": "epuck_mj/wall_loops.py",
+    "matplotlib": (
+        "epuck_mj/render.py",
+        "evolution/figures.py",
+        "evolution/report/figures/",
+    ),
+    "yaml": ("evolution/config.py", "evolution/study_config.py"),
 }
 """Packages that only one place may import."""
 

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from evolution.claims import (
+from evolution.config import find_config, load_config
+from evolution.report.claims import (
     CONSISTENT,
     INCONSISTENT,
     UNTESTED,
@@ -18,8 +19,7 @@ from evolution.claims import (
     mean_to_best,
     verdicts,
 )
-from evolution.config import find_config, load_config
-from evolution.reproduction import reproduction
+from evolution.report.reproduction import reproduction
 from evolution.study_data import RunData, StudyData
 
 NAMES = ("de-best", "de-rand", "ga")

@@ -1,0 +1,172 @@
+"""Figures of a study's champions: what luck gave them, and what fresh starts say."""
+
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from evolution.report.figures.style import (
+    COLUMN,
+    PAGE,
+    PRINT,
+    YARDSTICK_LABEL,
+    YARDSTICK_LOOK,
+    Look,
+    counted,
+    counts,
+    legend_below,
+    looks,
+    robot_name,
+    robot_panels,
+    with_runs,
+    yardstick,
+)
+from evolution.statistics import quartiles
+from evolution.study_data import StudyData
+
+MOST_COLUMNS = 3
+"""Panels side by side."""
+
+SPREAD = 0.28
+"""Farthest that a run's dot lies from its row, in rows."""
+
+CHAMPION = "A champion's held-out fitness is its mean on the test starts."
+
+
+@matplotlib.rc_context(PRINT)
+def stored_and_held_out(data: StudyData) -> tuple[Figure, str]:
+    """Held-out against stored fitness of every champion, a panel per experiment."""
+    runs, styles = with_runs(data), looks(data)
+    columns = min(len(runs), MOST_COLUMNS)
+    rows = -(-len(runs) // columns)
+    width = max(COLUMN, PAGE * columns / MOST_COLUMNS)
+    figure = Figure(figsize=(width, 0.4 + 2 * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
+    for axes in grid.flat[len(runs) :]:
+        axes.remove()
+    for axes, (name, each) in zip(grid.flat, runs.items(), strict=False):
+        _draw_luck(axes, data, name, styles[name])
+        axes.set_title(counted(styles[name], len(each)))
+        axes.set(ylim=(0, data.steps), xlabel="runs, in order of stored fitness")
+    for axes in grid[:, 0]:
+        axes.set_ylabel(f"fitness (max {data.steps})")
+    dot = {"color": "0.3", "ls": "", "marker": "o", "ms": 4}
+    lines = {"stored": Line2D([], [], color="black", ls="", marker="_", ms=6, mew=1.4)}
+    for robot in data.robots:
+        fill = "0.3" if robot == data.robots[0] else "white"
+        lines[f"held-out, {robot_name(robot)}"] = Line2D([], [], mfc=fill, **dot)
+    legend_below(figure, lines)
+    caption = (
+        f"Stored and held-out fitness of each champion ({counts(data)}). The black "
+        "bar is what evolution believed of it; the vertical distance from there down "
+        f"to a dot is the luck that it kept. {CHAMPION}"
+    )
+    return figure, caption
+
+
+@matplotlib.rc_context(PRINT)
+def held_out(data: StudyData) -> tuple[Figure, str]:
+    """Held-out fitness of every champion, a row per experiment, a panel per robot."""
+    runs, styles = with_runs(data), looks(data)
+    labels = [counted(styles[name], len(each)) for name, each in runs.items()]
+    figure, panels = robot_panels(data, labels)
+    lines = {
+        "one run": Line2D([], [], color="0.4", ls="", marker="o", ms=3.5),
+        "median and IQR": Line2D([], [], color="black", lw=0.8, marker="|", mew=2),
+    }
+    for axes, robot in zip(panels, data.robots, strict=True):
+        for row, name in enumerate(runs):
+            _draw_row(axes, row, data.held_out(name, robot), styles[name])
+        reference = yardstick(data, robot)
+        if reference is not None:
+            lines[YARDSTICK_LABEL] = axes.axvline(reference, **YARDSTICK_LOOK, zorder=1)
+        axes.set(xlabel=f"held-out fitness (max {data.steps})", xlim=(0, data.steps))
+    legend_below(figure, lines)
+    caption = (
+        f"Held-out fitness of the champions ({counts(data)}): every run, the median "
+        f"(tick) and the interquartile range (bar). {CHAMPION}"
+    )
+    if YARDSTICK_LABEL in lines:
+        caption += f" Dashed: the {YARDSTICK_LABEL} on the same starts."
+    return figure, caption
+
+
+@matplotlib.rc_context(PRINT)
+def rungs(data: StudyData) -> tuple[Figure, str] | None:
+    """Held-out fitness on the last robot against the first; None if there is one."""
+    if len(data.robots) < 2:
+        return None
+    first, last = data.robots[0], data.robots[-1]
+    runs, styles = with_runs(data), looks(data)
+    figure = Figure(figsize=(COLUMN, 4), layout="constrained")
+    axes = figure.add_subplot()
+    axes.plot([0, data.steps], [0, data.steps], color="0.5", lw=0.8, zorder=1)
+    lines = {}
+    for name, each in runs.items():
+        x, y = data.held_out(name, first), data.held_out(name, last)
+        axes.scatter(x, y, **_dots(styles[name]))
+        lines[counted(styles[name], len(each))] = Line2D(
+            [], [], color=styles[name].color, ls="", marker=styles[name].marker, ms=4
+        )
+    axes.set(
+        xlim=(0, data.steps),
+        ylim=(0, data.steps),
+        aspect="equal",
+        xlabel=f"held-out fitness, {robot_name(first)} (max {data.steps})",
+        ylabel=f"held-out fitness, {robot_name(last)} (max {data.steps})",
+    )
+    # as many ticks on both
+    axes.locator_params(nbins=4)
+    legend_below(figure, lines)
+    caption = (
+        f"Held-out fitness of the champions on the {robot_name(last)} against that on "
+        f"the {robot_name(first)} ({counts(data)}). On the diagonal a champion keeps "
+        "its fitness from one robot to the other."
+    )
+    return figure, caption
+
+
+def _draw_luck(axes: Axes, data: StudyData, name: str, look: Look) -> None:
+    """Stored and held-out fitness of an experiment's runs, by rising stored fitness."""
+    stored = data.stored(name)
+    order = np.argsort(stored, kind="stable")
+    rank, stored = np.arange(order.size), stored[order]
+    tests = np.array([data.held_out(name, robot)[order] for robot in data.robots])
+    # held-out fitness may also be the higher one
+    everything = np.vstack([tests, stored])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    axes.vlines(rank, low, high, color=look.color, lw=0.6, zorder=2)
+    axes.scatter(rank, stored, marker="_", s=26, color="black", zorder=4)
+    # the robot evolved on is filled, and in front
+    for i, test in reversed(list(enumerate(tests))):
+        axes.scatter(rank, test, **_dots(look, filled=i == 0))
+    axes.set(xticks=[], xlim=(-1, order.size))
+
+
+def _dots(look: Look, filled: bool = True) -> dict[str, Any]:
+    """Arguments of a scatter plot of an experiment's runs."""
+    return {
+        "marker": look.marker,
+        "s": 18,
+        "facecolor": look.color if filled else "white",
+        "edgecolor": "white" if filled else look.color,
+        "linewidths": 0.4 if filled else 0.9,
+        "zorder": 3,
+        # whole even at 0
+        "clip_on": False,
+    }
+
+
+def _draw_row(axes: Axes, row: int, sample: np.ndarray, look: Look) -> None:
+    """Values `(runs,)` as dots around a row; of two and more, median and quartiles."""
+    # multiples of the golden ratio never pile up
+    offset = SPREAD * (2 * ((np.arange(sample.size) * 0.618034 + 0.5) % 1) - 1)
+    axes.scatter(sample, row + offset, **_dots(look))
+    if sample.size == 1:
+        return
+    found = quartiles(sample)
+    axes.plot([found.lower, found.upper], [row, row], color="black", lw=0.8, zorder=4)
+    axes.plot(found.median, row, "|", color="black", ms=11, mew=1.6, zorder=4)

@@ -1,0 +1,209 @@
+"""Figures of a study against evaluations: how fitness grew, and what it cost."""
+
+from collections.abc import Sequence
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from evolution.report.figures.style import (
+    COLUMN,
+    PRINT,
+    YARDSTICK_LABEL,
+    YARDSTICK_LOOK,
+    YARDSTICK_SHORT,
+    Look,
+    count_evaluations,
+    counted,
+    counts,
+    legend_below,
+    looks,
+    robot_name,
+    with_runs,
+    yardstick,
+)
+from evolution.study_data import RunData, StudyData
+from evolution.targets import ecdf, evaluations_to_target
+
+N_POINTS = 150
+"""Most points of a curve: more than print shows, few enough for small files."""
+
+N_MARKERS = 6
+"""Markers along a curve, which tell it apart where colour is missing."""
+
+TARGET_SHARES: tuple[float, ...] = tuple(
+    fitness / 300 for fitness in range(50, 250, 25)
+)
+"""Targets as shares of the highest fitness there is: 50, 75, ... 225 of 300."""
+
+STORED = "Stored fitness is what evolution believes: the mean of the few trials it ran."
+
+
+def on_grid(
+    evaluations: np.ndarray, values: np.ndarray, grid: np.ndarray
+) -> np.ndarray:
+    """Values `(generations,)` as a step function at `grid`, `(grid,)`.
+
+    Args:
+        evaluations: after which each value holds, `(generations,)`, increasing.
+        values: the last one holds for ever.
+        grid: evaluations, none before the first.
+    """
+    return values[np.searchsorted(evaluations, grid, side="right") - 1]
+
+
+def common_grid(runs: Sequence[RunData]) -> np.ndarray:
+    """Evaluations where curves of runs are compared, from where all of them began."""
+    evaluations = [run.history["evaluations"] for run in runs]
+    grid = np.unique(np.concatenate(evaluations))
+    grid = grid[grid >= max(each[0] for each in evaluations)]
+    thinned = np.linspace(0, grid.size - 1, min(grid.size, N_POINTS))
+    return grid[np.round(thinned).astype(int)]
+
+
+def curves(runs: Sequence[RunData], column: str, grid: np.ndarray) -> np.ndarray:
+    """A column of the history of each run at `grid`, `(runs, grid)`."""
+    return np.array(
+        [on_grid(run.history["evaluations"], run.history[column], grid) for run in runs]
+    )
+
+
+@matplotlib.rc_context(PRINT)
+def fitness(data: StudyData, name: str) -> tuple[Figure, str]:
+    """Population best and mean of an experiment, as in figures 3 to 5 of the paper.
+
+    Raises:
+        KeyError: if there is no experiment of that name.
+        ValueError: if it has no runs.
+    """
+    look, runs = looks(data)[name], data.runs[name]
+    if not runs:
+        raise ValueError(f"expected runs of '{name}', got none")
+    grid = common_grid(runs)
+    figure = Figure(figsize=(COLUMN, 2.8), layout="constrained")
+    axes = figure.add_subplot()
+    lines = {}
+    for column, color, dashes in [
+        ("best", look.color, "-"),
+        ("mean", "0.3", (0, (4, 1.5))),
+    ]:
+        values = curves(runs, column, grid)
+        if len(runs) > 1:
+            axes.plot(grid, values.T, color=color, lw=0.4, alpha=0.35)
+        line = _median_and_band(axes, grid, values, color)
+        line.set(linestyle=dashes)
+        lines[f"population {column}"] = line
+    _stored_axes(axes, data, grid[-1])
+    legend_below(figure, lines, title=counted(look, len(runs)))
+    caption = (
+        f"{look.label}: stored fitness of the best of the population and its mean "
+        "against evaluations. Median and interquartile range over runs "
+        f"(n = {len(runs)}); thin: the single runs. {STORED}"
+    )
+    return figure, caption
+
+
+@matplotlib.rc_context(PRINT)
+def fitness_all(data: StudyData) -> tuple[Figure, str]:
+    """Best so far of all experiments on one axes."""
+    figure = Figure(figsize=(COLUMN, 3.3), layout="constrained")
+    axes = figure.add_subplot()
+    lines, styles, runs, last = {}, looks(data), with_runs(data), 0.0
+    for i, (name, each) in enumerate(runs.items()):
+        grid = common_grid(each)
+        best = np.array(
+            [
+                on_grid(
+                    run.history["evaluations"],
+                    np.maximum.accumulate(run.history["best"]),
+                    grid,
+                )
+                for run in each
+            ]
+        )
+        line = _median_and_band(axes, grid, best, styles[name].color)
+        _mark(line, styles[name], grid.size, i, len(runs))
+        lines[counted(styles[name], len(each))] = line
+        last = max(last, grid[-1])
+    reference = yardstick(data, data.robots[0])
+    if reference is not None:
+        line = axes.axhline(reference, **YARDSTICK_LOOK)
+        lines[YARDSTICK_SHORT] = line
+    _stored_axes(axes, data, last)
+    legend_below(figure, lines)
+    caption = (
+        "Best stored fitness so far against evaluations: median and interquartile "
+        f"range over runs ({counts(data)}). {STORED}"
+    )
+    if reference is not None:
+        caption += (
+            f" Dashed: held-out fitness of the {YARDSTICK_LABEL} on the "
+            f"{robot_name(data.robots[0])}, which has no stored fitness."
+        )
+    return figure, caption
+
+
+@matplotlib.rc_context(PRINT)
+def targets(data: StudyData) -> tuple[Figure, str]:
+    """Share of all pairs of run and target reached, against evaluations."""
+    figure = Figure(figsize=(COLUMN, 3.2), layout="constrained")
+    axes = figure.add_subplot()
+    lines, styles, runs = {}, looks(data), with_runs(data)
+    last = max(run.history["evaluations"][-1] for each in runs.values() for run in each)
+    budgets = np.linspace(0, last, N_POINTS + 1)
+    for i, (name, each) in enumerate(runs.items()):
+        share = ecdf(hits(each, data.steps), budgets)
+        (line,) = axes.plot(
+            budgets, share, color=styles[name].color, drawstyle="steps-post"
+        )
+        _mark(line, styles[name], budgets.size, i, len(runs))
+        lines[counted(styles[name], len(each))] = line
+    count_evaluations(axes, last)
+    axes.set(ylabel="share of (run, target) pairs", ylim=(0, 1.02))
+    legend_below(figure, lines)
+    fitnesses = ", ".join(f"{share * data.steps:.0f}" for share in TARGET_SHARES)
+    caption = (
+        "Share of pairs of run and target that were reached within a number of "
+        f"evaluations ({counts(data)}). Targets: best stored fitness of {fitnesses} "
+        f"of {data.steps}."
+    )
+    return figure, caption
+
+
+def hits(runs: Sequence[RunData], steps: int) -> np.ndarray:
+    """Evaluations until each run reached each target, `(runs, targets)`; nan: never."""
+    return np.array(
+        [
+            [
+                evaluations_to_target(
+                    run.history["evaluations"], run.history["best"], share * steps
+                )
+                for share in TARGET_SHARES
+            ]
+            for run in runs
+        ]
+    )
+
+
+def _median_and_band(axes: Axes, grid: np.ndarray, values: np.ndarray, color) -> Line2D:
+    """The median of `(runs, grid)` as a line, the quartiles as a band behind it."""
+    low, median, high = np.quantile(values, [0.25, 0.5, 0.75], axis=0)
+    if len(values) > 1:
+        axes.fill_between(grid, low, high, color=color, alpha=0.2, lw=0)
+    (line,) = axes.plot(grid, median, color=color, lw=1.4)
+    return line
+
+
+def _mark(line: Line2D, look: Look, size: int, i: int, n: int) -> None:
+    """Dashes and markers of an experiment, the `i`th of `n` curves of `size` points."""
+    line.set(linestyle=look.dashes, marker=look.marker, markersize=3.5)
+    # apart from those of the other curves
+    every = max(1, size // N_MARKERS)
+    line.set_markevery((round(every * i / n), every))
+
+
+def _stored_axes(axes: Axes, data: StudyData, last: float) -> None:
+    count_evaluations(axes, last)
+    axes.set(ylabel=f"stored fitness (max {data.steps})", ylim=(0, data.steps))

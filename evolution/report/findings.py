@@ -1,0 +1,196 @@
+"""The findings of a report, per experiment: fitness, rungs, luck and behaviour."""
+
+import numpy as np
+
+from epuck_mj.behaviour_classes import HUG
+from evolution.report.blocks import Block, Heading, Paragraph, Table
+from evolution.report.figures.style import YARDSTICK_LABEL, robot_name, with_runs
+from evolution.report.samples import (
+    FEWEST_FOR_RANKS,
+    class_means,
+    clearances,
+    kept,
+    known,
+    most_believed,
+    rank_correlation,
+    tests_of,
+)
+from evolution.report.tables import labels_of, shown_robots
+from evolution.report.words import NOTHING, percent, spread
+from evolution.study_data import StudyData
+
+
+def held_out_fitness(data: StudyData) -> list[Block]:
+    """The main table: held-out fitness first."""
+    robots, labels = shown_robots(data), labels_of(data)
+    rows = []
+    for name, runs in with_runs(data).items():
+        row = [labels[name], str(len(runs))]
+        for robot in robots:
+            sample = data.held_out(name, robot)
+            crashes = known(tests_of(data, name, robot), "crash_rate")
+            row += [spread(sample), f"{sample.max():.1f}", _percent_median(crashes)]
+        rows.append([*row, spread(data.stored(name))])
+    if data.yardstick:
+        row = [YARDSTICK_LABEL, NOTHING]
+        for robot in robots:
+            test = data.yardstick.get(robot, {})
+            mean = test.get("mean")
+            row += ["-" if mean is None else f"{mean:.1f}", NOTHING]
+            row.append(percent(test.get("crash_rate")))
+        rows.append([*row, NOTHING])
+    columns = ["experiment", "n"]
+    for robot in robots:
+        columns += [f"held-out, {robot_name(robot)}", "best run", "crashes"]
+    return [
+        Heading("Held-out fitness"),
+        Paragraph(
+            "Median [quartiles] over runs of the champion's mean on the test starts, "
+            "the best run, and the median share of its trials that crash. Stored "
+            "fitness is last, since it is what the algorithm believes: a mean of few "
+            "trials that it chose for being high."
+        ),
+        Table([*columns, "stored"], rows),
+    ]
+
+
+def rungs(data: StudyData) -> list[Block]:
+    """How champions keep their fitness from robot to robot; nothing for one robot."""
+    if len(data.robots) < 2:
+        return []
+    labels, (first, last) = labels_of(data), (data.robots[0], data.robots[-1])
+    rows = []
+    for name, runs in with_runs(data).items():
+        a, b = data.held_out(name, first), data.held_out(name, last)
+        rank = rank_correlation(a, b)
+        rows.append(
+            (
+                labels[name],
+                str(len(runs)),
+                spread(a),
+                spread(b),
+                spread(kept(b, a), 100, ".0f"),
+                NOTHING if rank is None else f"{rank:.2f}",
+            )
+        )
+    one, other = robot_name(first), robot_name(last)
+    return [
+        Heading("From rung to rung"),
+        Paragraph(
+            f"Champions evolved on the {one}, tested on both from the same starts. "
+            f"Kept: fitness on the {other} in percent of that on the {one}, by run. "
+            "Rank correlation: Spearman's over runs, given from "
+            f"{FEWEST_FOR_RANKS} runs on."
+        ),
+        Table(("experiment", "n", one, other, "kept", "rank correlation"), rows),
+    ]
+
+
+def luck(data: StudyData) -> list[Block]:
+    """What stored fitness promised and fresh starts did not keep."""
+    labels, robot = labels_of(data), data.robots[0]
+    rows = []
+    for name, runs in with_runs(data).items():
+        stored, held_out = data.stored(name), data.held_out(name, robot)
+        believed, worth = most_believed(data, name)
+        rows.append(
+            (
+                labels[name],
+                str(len(runs)),
+                spread(stored),
+                spread(held_out),
+                spread(stored - held_out),
+                spread(believed),
+                spread(worth),
+                spread(believed - worth),
+            )
+        )
+    return [
+        Heading("What stored fitness promised"),
+        Paragraph(
+            f"On the {robot_name(robot)}, which it evolved on: stored against held-out "
+            "fitness of the champion, then of the individual that the run believed "
+            "most in. The difference is luck: of many noisy evaluations the highest is "
+            "believed."
+        ),
+        Table(
+            (
+                "experiment",
+                "n",
+                "champion, stored",
+                "held-out",
+                "luck",
+                "most believed, stored",
+                "held-out",
+                "luck",
+            ),
+            rows,
+        ),
+    ]
+
+
+def behaviour(data: StudyData) -> list[Block]:
+    """What champions do, and how close to the wall they ride."""
+    labels = labels_of(data)
+    shares = {
+        (name, robot): class_means(data, name, robot)
+        for robot in shown_robots(data)
+        for name in with_runs(data)
+    }
+    classes = dict.fromkeys(name for each in shares.values() for name in each)
+    seen = [c for c in classes if any(each.get(c) for each in shares.values())]
+    if not seen:
+        return [
+            Heading("Behaviour"),
+            Paragraph("Not known: no run has behaviour classes."),
+        ]
+    rows = []
+    for (name, robot), each in shares.items():
+        near = clearances(data, name, robot)
+        rows.append(
+            (
+                labels[name],
+                robot_name(robot),
+                *(percent(each.get(c, 0.0) if each else None) for c in seen),
+                spread(near, 1000),
+                f"{(near < HUG).sum()} of {near.size}",
+            )
+        )
+    for robot in shown_robots(data):
+        test = data.yardstick.get(robot, {})
+        if test.get("behaviour"):
+            near = (test.get("metrics") or {}).get("clearance_mean")
+            rows.append(
+                (
+                    YARDSTICK_LABEL,
+                    robot_name(robot),
+                    *(percent(test["behaviour"].get(c, 0.0)) for c in seen),
+                    NOTHING if near is None else f"{near * 1000:.1f}",
+                    NOTHING,
+                )
+            )
+    return [
+        Heading("Behaviour"),
+        Paragraph(
+            "Share of the test trials in each class, mean over runs; mean clearance "
+            "from shell to wall in mm, median [quartiles] over runs; champions whose "
+            f"mean clearance is below {HUG * 1000:.0f} mm. A champion that rides so "
+            "close is a reality gap in waiting: a real robot's sensors and wheels err "
+            "by more."
+        ),
+        Table(
+            (
+                "experiment",
+                "robot",
+                *seen,
+                "clearance [mm]",
+                f"below {HUG * 1000:.0f} mm",
+            ),
+            rows,
+            texts=2,
+        ),
+    ]
+
+
+def _percent_median(shares: np.ndarray) -> str:
+    return percent(float(np.median(shares)) if shares.size else None)

@@ -1,0 +1,131 @@
+"""The frame of a report: what was run and is missing, and how to get it again."""
+
+from evolution.report.blocks import Block, Code, Heading, Listing, Paragraph, Table
+from evolution.report.figures.style import robot_name, with_runs
+from evolution.report.samples import tests_of
+from evolution.report.summary import commands, config_differences
+from evolution.report.tables import labels_of, provenance, shown_robots
+from evolution.report.words import NOTHING, evaluations, seeds_text
+from evolution.study_data import StudyData
+
+
+def what_was_run(data: StudyData) -> list[Block]:
+    """Title, what is missing, and the experiments."""
+    labels, runs = labels_of(data), with_runs(data)
+    sizes = sorted({len(each) for each in runs.values()})
+    starts = {
+        test["starts"]
+        for name in runs
+        for robot in data.robots
+        for test in tests_of(data, name, robot)
+        if "starts" in test
+    }
+    n_starts = " or ".join(f"{n:,}" for n in sorted(starts)) or "the"
+    blocks: list[Block] = [
+        Heading(f"Report of the study {data.path.as_posix()}", 1),
+        Paragraph(
+            "Wall following evolved for an e-puck: a replication, with our own "
+            "artefacts and another simulator, of a comparison of a genetic algorithm "
+            "with two variants of differential evolution."
+        ),
+        Heading("What is missing"),
+    ]
+    if data.missing:
+        blocks.append(Listing(data.missing))
+    else:
+        blocks.append(Paragraph("Nothing: all runs that were begun are finished."))
+    if sizes[0] < 2:
+        few = [labels[name] for name, each in runs.items() if len(each) < 2]
+        blocks.append(
+            Paragraph(
+                f"Only one run of {', '.join(few)}: one run has a value but says "
+                "nothing of the spread between runs, so there is no interval "
+                "(n = 1, no interval) and no verdict."
+            )
+        )
+    blocks += [
+        Heading("What was run"),
+        Paragraph(
+            f"{sum(len(each) for each in runs.values())} finished runs of "
+            f"{len(runs)} experiments. Evolved on the {robot_name(data.robots[0])}. "
+            f"Each run's champion is tested on {n_starts} test starts, the same for "
+            "all and never seen by evolution, on the "
+            f"{' and the '.join(map(robot_name, shown_robots(data)))}. The unit is "
+            f"the run; fitness is at most {data.steps}, the control steps of a trial."
+        ),
+        Table(
+            ("experiment", "name", "seeds", "n", "budget", "trials", "spent"),
+            [
+                (
+                    labels[name],
+                    name,
+                    seeds_text([run.seed for run in data.runs[name]]) or NOTHING,
+                    str(len(data.runs[name])),
+                    f"{config.evaluations:,}",
+                    str(config.trials),
+                    evaluations(
+                        max(
+                            (r.history["evaluations"][-1] for r in data.runs[name]),
+                            default=None,
+                        )
+                    ),
+                )
+                for name, config in data.configs.items()
+            ],
+            texts=3,
+        ),
+        Paragraph(
+            "Budget and spent are individual evaluations, each of that many trials; a "
+            "run spends whole generations only."
+        ),
+    ]
+    return blocks
+
+
+def how_to_reproduce(data: StudyData, output: str, ioh: bool) -> list[Block]:
+    """Files, commands, and where the runs came from."""
+    came_from, labels = provenance(data), labels_of(data)
+    blocks: list[Block] = [
+        Heading("How to get every number again"),
+        Listing(
+            [
+                "runs.csv: every run. Tables of this page are made of it, "
+                "pairwise.csv, success.csv and targets.csv; summary.json has all.",
+                *(["ioh/: the histories, for IOHanalyzer."] if ioh else []),
+                "Random numbers of intervals are drawn from a fixed seed: the same "
+                "study gives the same bytes.",
+            ]
+        ),
+    ]
+    for what, line in commands(data, output, ioh).items():
+        blocks += [Paragraph(f"{what[0].upper()}{what[1:]}:"), Code([line])]
+    blocks += [
+        Paragraph(
+            "The runs were begun with these arguments of python -m evolution.study or "
+            "evolution.run:"
+        ),
+        Code(came_from["argv"] or [NOTHING]),
+        Paragraph("Code, versions and processors of the runs:"),
+        Listing(
+            [
+                f"commit {NOTHING if not came_from['git'] else ''}"
+                + "; ".join(came_from["git"]),
+                *came_from["versions"],
+                *came_from["processor"],
+            ]
+        ),
+    ]
+    differences = config_differences(data)
+    if differences:
+        names = list(data.configs)
+        blocks += [
+            Paragraph("The experiments differ in these keys:"),
+            Table(
+                ("key", *(labels[name] for name in names)),
+                [
+                    (key, *(str(values.get(name, NOTHING)) for name in names))
+                    for key, values in differences.items()
+                ],
+            ),
+        ]
+    return blocks

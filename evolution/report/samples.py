@@ -1,0 +1,69 @@
+"""Samples of a report: what an experiment's champions show, one value per run."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from evolution.report.tables import clearance
+from evolution.study_data import StudyData
+
+FEWEST_FOR_RANKS = 5
+"""Runs below which a rank correlation says nothing: of 4, any order is common."""
+
+
+def tests_of(data: StudyData, name: str, robot: str) -> list[Mapping[str, Any]]:
+    """The held-out evaluations of an experiment's champions on a robot."""
+    return [run.champion.scores["held_out"][robot] for run in data.runs[name]]
+
+
+def known(tests: list[Mapping[str, Any]], key: str) -> np.ndarray:
+    """A value of each held-out evaluation that has it, `(n,)`."""
+    values = [test.get(key) for test in tests]
+    return np.array([value for value in values if value is not None], float)
+
+
+def clearances(data: StudyData, name: str, robot: str) -> np.ndarray:
+    """Mean clearance of each champion that was near a wall [m], `(n,)`."""
+    values = [clearance(test) for test in tests_of(data, name, robot)]
+    return np.array([value for value in values if value is not None], float)
+
+
+def class_means(data: StudyData, name: str, robot: str) -> dict[str, float]:
+    """Mean share of each behaviour class over the runs that say; may be empty."""
+    each = [test["behaviour"] for test in tests_of(data, name, robot) if _says(test)]
+    classes = dict.fromkeys(name for shares in each for name in shares)
+    return {
+        name: float(np.mean([shares.get(name, 0.0) for shares in each]))
+        for name in classes
+    }
+
+
+def _says(test: Mapping[str, Any]) -> bool:
+    return bool(test.get("behaviour"))
+
+
+def kept(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
+    """Share of `whole` that `part` still has, `(n,)`, of the runs that had any."""
+    some = whole > 0
+    return part[some] / whole[some]
+
+
+def most_believed(data: StudyData, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Stored and held-out fitness of each run's most believed individual, `(n,)`.
+
+    Held-out on the robot evolved on; of the runs that say.
+    """
+    found = [run.champion.scores.get("most_believed") for run in data.runs[name]]
+    pairs = [(each["stored"], each["held_out"]) for each in found if each]
+    stored, held_out = np.array(pairs, float).reshape(-1, 2).T
+    return stored, held_out
+
+
+def rank_correlation(a: np.ndarray, b: np.ndarray) -> float | None:
+    """Spearman's, None of fewer than 5 runs or of equal values."""
+    if a.size < FEWEST_FOR_RANKS or np.ptp(a) == 0 or np.ptp(b) == 0:
+        return None
+    result: Any = stats.spearmanr(a, b)
+    return float(result.statistic)

@@ -1,0 +1,495 @@
+"""Reports: numbers checked by hand, pages that are sound, clear refusals."""
+
+import csv
+import json
+import math
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from epuck_mj.errors import UserError
+from evolution.comparisons import holm
+from evolution.report import command as module
+from evolution.report.blocks import (
+    Code,
+    Heading,
+    Listing,
+    Paragraph,
+    Picture,
+    Table,
+    to_html,
+    to_markdown,
+)
+from evolution.report.command import report, tables
+from evolution.report.comparisons import BEATS, FOLLOWS, pair_rows, success_rows
+from evolution.report.figures.curves import TARGET_SHARES
+from evolution.report.samples import rank_correlation
+from evolution.report.summary import summary, summary_text
+from evolution.report.tables import csv_text, run_rows, target_rows
+from evolution.report.words import compared, seeds_text, spread
+from evolution.study_data import load_study
+from tests.study_on_disk import LEVELS, history, write_study
+
+NAMES = tuple(LEVELS)
+N_OF = (1, 2, 3, 12)
+
+
+def seeds(n):
+    return {name: list(range(1, n + 1)) for name in NAMES}
+
+
+def rows_of(text):
+    return list(csv.DictReader(text.splitlines()))
+
+
+@pytest.fixture
+def bare(monkeypatch):
+    """No figures: they take their time and have tests of their own."""
+    monkeypatch.setattr(module, "figures", lambda data: iter(()))
+
+
+@pytest.fixture(scope="module", params=N_OF, ids=lambda n: f"{n} seeds")
+def study(request, tmp_path_factory):
+    """A study of so many seeds of each experiment."""
+    n = request.param
+    return load_study(write_study(tmp_path_factory.mktemp("s") / "study", seeds(n)))
+
+
+@pytest.fixture(scope="module")
+def large(tmp_path_factory):
+    return load_study(write_study(tmp_path_factory.mktemp("l") / "study", seeds(12)))
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """A whole report, figures and all, of a study that lacks a run."""
+    place = tmp_path_factory.mktemp("w")
+    runs = {"de-best": [1, 2, 3], "de-rand": [1, 2, 3], "ga": [1, 2]}
+    path = write_study(place / "study", runs)
+    assert report([str(path), "--output", str(place / "out"), "--ioh"]) == 0
+    return place
+
+
+# tables
+
+
+def test_runs_read_back_exactly(study):
+    rows = rows_of(tables(study)["runs.csv"])
+    assert len(rows) == sum(map(len, study.runs.values()))
+    for row in rows:
+        run = next(
+            r for r in study.runs[row["experiment"]] if r.seed == int(row["seed"])
+        )
+        assert float(row["epuck mean"]) == run.held_out("epuck")
+        assert float(row["stored"]) == run.stored
+        assert int(row["evaluations"]) == 3000
+        # a generation that was repeated after a crash counts once
+        assert int(row["control_steps"]) == 1900
+        assert Path(row["path"]) == run.path
+    columns = list(rows[0])
+    assert columns.index("epuck mean") < columns.index("epuck_planar mean")
+    assert columns.index("epuck_planar mean") < columns.index("stored")
+
+
+def test_a_run_that_says_less_has_empty_cells(tmp_path):
+    path = write_study(tmp_path / "study", seeds(2))
+    champion = path / "ga/seed-1/champion.json"
+    fields = json.loads(champion.read_text())
+    fields["scores"]["held_out"] = {
+        robot: {"mean": 100.0, "crash_rate": 0.1, "starts": 1000}
+        for robot in fields["scores"]["held_out"]
+    }
+    del fields["scores"]["most_believed"]
+    champion.write_text(json.dumps(fields))
+    (path / "ga/seed-1/timing.csv").unlink()
+    data = load_study(path)
+    row = next(r for r in rows_of(tables(data)["runs.csv"]) if r["experiment"] == "ga")
+    for column in ("epuck worst", "epuck following", "epuck mean_low", "control_steps"):
+        assert row[column] == ""
+    # of a criterion that not every run can meet or fail nothing is said
+    assert {row.criterion for row in success_rows(data)} == {BEATS}
+    json.loads(summary_text(summary(data, "out", False)))
+
+
+def test_pairs_by_hand(study):
+    rows = rows_of(tables(study)["pairwise.csv"])
+    assert len(rows) == 3 * 3
+    samples = {n: study.held_out(n, "epuck") for n in NAMES}
+    own = [row for row in rows if row["measure"] == "held-out epuck"]
+    assert [(row["a"], row["b"]) for row in own] == list(combinations(NAMES, 2))
+    p = [
+        stats.mannwhitneyu(samples[r["a"]], samples[r["b"]], method="exact").pvalue
+        for r in own
+    ]
+    for row, value, adjusted in zip(own, p, holm(np.array(p)), strict=True):
+        a, b = samples[row["a"]], samples[row["b"]]
+        wins = np.mean([(x > y) + (x == y) / 2 for x in a for y in b])
+        assert float(row["a12"]) == pytest.approx(wins)
+        assert float(row["u"]) == pytest.approx(wins * a.size * b.size)
+        assert float(row["p"]) == pytest.approx(value)
+        assert float(row["p_holm"]) == pytest.approx(adjusted)
+        assert float(row["median_a"]) == np.median(a)
+        difference = float(row["median_difference"])
+        assert difference == np.median(a) - np.median(b)
+        assert (int(row["n_a"]), row["family"]) == (a.size, "3")
+        low, high = float(row["a12_low"]), float(row["a12_high"])
+        if a.size == 1:
+            assert math.isnan(low)
+            assert math.isnan(high)
+            assert math.isnan(float(row["median_difference_low"]))
+        else:
+            assert low <= wins <= high
+
+
+def test_no_stars_below_ten_runs(study):
+    n = len(study.runs["ga"])
+    for row in pair_rows(study):
+        assert bool(row.stars) == (n >= 10 and row.p_holm < 0.05)
+        text = compared(row, "A", "B")
+        assert "significant" not in text
+        assert ("no verdict" in text) == (n < 10)
+    assert any(row.stars for row in pair_rows(study)) == (n >= 10)
+
+
+def test_words_name_the_better_one(large):
+    row = next(r for r in pair_rows(large) if r.measure == "held-out epuck")
+    assert (row.a, row.b) == ("de-best", "de-rand")
+    text = compared(row, "A", "B")
+    assert text.startswith("A beats B in 100% of the pairs of runs: medians ")
+    # told from the other side, it is the same sentence
+    mirrored = replace(
+        row,
+        a=row.b,
+        b=row.a,
+        median_a=row.median_b,
+        median_b=row.median_a,
+        a12=1 - row.a12,
+        a12_low=1 - row.a12_high,
+        a12_high=1 - row.a12_low,
+        median_difference=-row.median_difference,
+        median_difference_low=-row.median_difference_high,
+        median_difference_high=-row.median_difference_low,
+    )
+    assert compared(mirrored, "B", "A") == text
+
+
+def test_equal_samples_are_no_error(tmp_path):
+    path = write_study(tmp_path / "study", seeds(3))
+    for champion in path.glob("*/seed-*/champion.json"):
+        fields = json.loads(champion.read_text())
+        for test in fields["scores"]["held_out"].values():
+            test["mean"] = 100.0
+        champion.write_text(json.dumps(fields))
+    data = load_study(path)
+    rows = [row for row in pair_rows(data) if row.measure != "stored"]
+    assert {(row.p, row.p_holm, row.a12, row.u) for row in rows} == {(1, 1, 0.5, 4.5)}
+    assert rank_correlation(np.full(5, 1.0), np.arange(5.0)) is None
+    json.loads(summary_text(summary(data, "out", False)))
+
+
+def test_successes_by_hand(study):
+    rows = rows_of(tables(study)["success.csv"])
+    n = len(study.runs["ga"])
+    assert len(rows) == 2 * 2 * (3 + 3)
+    for row in rows:
+        robot = row["robot"]
+        runs = study.runs[row["experiment"]]
+        if row["criterion"] == BEATS:
+            met = [run.held_out(robot) >= 195 for run in runs]
+        else:
+            shares = [
+                run.champion.scores["held_out"][robot]["behaviour"] for run in runs
+            ]
+            met = [s["wall follower"] + s["hugger"] >= 0.9 for s in shares]
+        assert (int(row["successes"]), int(row["n"])) == (sum(met), n)
+        bounds = stats.binomtest(sum(met), n).proportion_ci(method="wilson")
+        assert float(row["low"]) == pytest.approx(bounds.low)
+        assert float(row["high"]) == pytest.approx(bounds.high)
+        if row["other"]:
+            other = int(row["other_successes"])
+            table = [[sum(met), n - sum(met)], [other, n - other]]
+            expected: Any = stats.fisher_exact(table)
+            assert float(row["fisher_p"]) == pytest.approx(expected.pvalue)
+            assert float(row["fisher_p_holm"]) >= float(row["fisher_p"])
+        else:
+            assert row["fisher_p"] == ""
+
+
+def test_without_a_yardstick_nothing_is_measured_by_it(tmp_path, bare):
+    path = write_study(tmp_path / "study", seeds(2), yardstick=False)
+    assert {row.criterion for row in success_rows(load_study(path))} == {FOLLOWS}
+    assert report([str(path)]) == 0
+    text = (path / "report/report.md").read_text()
+    assert "not known, the hand-written wall follower was not tested" in text
+    assert "- wall-follower: not tested" in text
+
+
+def test_targets_by_hand(study):
+    rows = rows_of(tables(study)["targets.csv"])
+    assert len(rows) == 3 * len(TARGET_SHARES)
+    for row in rows:
+        name, target = row["experiment"], float(row["target"])
+        hits, cost = [], 0.0
+        for run in study.runs[name]:
+            best = history(name, run.seed)[:, 2]
+            reached = [i for i, value in enumerate(best) if value >= target]
+            spent = run.history["evaluations"]
+            hits += [spent[reached[0]]] if reached else []
+            cost += spent[reached[0]] if reached else spent[-1]
+        assert (int(row["hits"]), row["fitness"]) == (len(hits), "stored")
+        assert int(row["n"]) == len(study.runs[name])
+        expected = cost / len(hits) if hits else math.inf
+        assert float(row["expected_running_time"]) == pytest.approx(expected)
+        assert row["median_evaluations"] == (
+            repr(float(np.median(hits))) if hits else ""
+        )
+
+
+def test_csv_has_exact_floats_and_quotes():
+    rows = [{"a": 0.1 + 0.2, "b": None}, {"a": math.nan, "b": 'x, "y"'}]
+    text = csv_text(["a", "b"], rows)
+    assert text == 'a,b\n0.30000000000000004,\nnan,"x, ""y"""\n'
+
+
+def test_summary_is_strict_json_and_has_everything(study):
+    text = summary_text(summary(study, "out", True))
+    found = json.loads(text, parse_constant=pytest.fail)
+    best = found["experiments"]["de-best"]
+    sample = study.held_out("de-best", "epuck")
+    fitness = best["held_out"]["epuck"]["fitness"]
+    assert fitness["median"] == np.median(sample)
+    assert fitness["mean"] == pytest.approx(sample.mean())
+    share = sample / study.stored("de-best")
+    assert best["held_out"]["epuck"]["share_of_stored"]["median"] == np.median(share)
+    assert sum(best["held_out"]["epuck"]["behaviour"].values()) == pytest.approx(1)
+    assert found["config_differences"]["optimizer.strategy"] == {
+        "de-best": "best",
+        "de-rand": "rand",
+    }
+    assert "steps" not in found["config_differences"]
+    assert found["yardstick"]["epuck"]["mean"] == 195
+    assert "abc123 and changes" in found["provenance"]["git"]
+    assert found["commands"]["this report"].endswith("--output out --ioh")
+
+
+# words
+
+
+@pytest.mark.parametrize(
+    ("seeds", "text"),
+    [([1], "1"), ([1, 2, 3], "1-3"), ([1, 2, 5, 7, 8], "1-2,5,7-8"), ([], "")],
+)
+def test_seeds(seeds, text):
+    assert seeds_text(seeds) == text
+
+
+def test_spread_of_one_run_has_no_quartiles():
+    assert spread(np.array([3.14])) == "3.1 (n = 1)"
+    assert spread(np.array([])) == "-"
+    assert spread(np.array([1.0, 2, 3])) == "2.0 [1.5, 2.5]"
+
+
+# documents
+
+
+class Soundness(HTMLParser):
+    """Every tag closed, in order; nothing loaded from elsewhere."""
+
+    VOID = ("meta", "img")
+
+    def __init__(self):
+        super().__init__()
+        self.open: list[str] = []
+        self.text: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in self.VOID:
+            self.open.append(tag)
+        assert tag not in ("script", "link", "iframe")
+        for name, value in attrs:
+            assert not name.startswith("on")
+            if name in ("src", "href"):
+                assert (value or "").startswith("data:image/svg+xml;base64,")
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+def check_html(text):
+    parser = Soundness()
+    parser.feed(text)
+    parser.close()
+    assert parser.open == []
+    assert not re.search(r"https?:|//[a-z]|url\(|@import", text)
+    return " ".join("".join(parser.text).split())
+
+
+def check_markdown(text):
+    """Tables have as many cells in every line."""
+    tables = re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE)
+    for table in tables:
+        cells = {len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}
+        assert len(cells) == 1
+        assert set(table.splitlines()[1]) <= set("|-: ")
+    return tables
+
+
+def test_blocks_are_escaped():
+    nasty = '<b> a|b *c* `d` [e](f) & "g" _h_ epuck_planar'
+    blocks = [
+        Heading(nasty, 1),
+        Paragraph(nasty),
+        Listing([nasty, "- x"]),
+        Code(["a < b && c"]),
+        Table(("x", nasty), [("1", nasty)]),
+        Picture("p", nasty, b"<svg/>"),
+    ]
+    page = to_html(nasty, blocks)
+    assert check_html(page).count(nasty) == 7
+    text = to_markdown(blocks)
+    assert len(check_markdown(text)) == 1
+    assert r"\<b> a\|b \*c\* \`d\` [e\](f) & " in text
+    assert r"\_h\_ epuck_planar" in text
+    assert "\n- \\- x" in text
+    plain = "1 [2, 3] p < 0.1 & so"
+    assert to_markdown([Paragraph(plain)]) == f"{plain}\n"
+
+
+def test_report_of_a_partial_study(written, capsys):
+    out = written / "out"
+    text = (out / "report.md").read_text()
+    headings = re.findall(r"^## (.*)$", text, re.MULTILINE)
+    assert headings[:3] == ["What is missing", "What was run", "Held-out fitness"]
+    assert "- ga: no finished run of seed 3" in text
+    # held-out first, on wheels first, then what evolution believes
+    head = next(line for line in text.splitlines() if "| best run" in line)
+    order = [head.index(w) for w in ("wheeled robot", "planar robot", "stored")]
+    assert order == sorted(order)
+    assert "no verdict" in text
+    assert not re.search(r"significan|\\\*", text)
+    assert len(check_markdown(text)) > 8
+    page = (out / "report.html").read_text()
+    words = check_html(page)
+    assert "ga: no finished run of seed 3" in words
+    assert "A <fast> processor" in words
+    assert len(page) < 5e6
+
+
+def test_figures_are_shown_and_there(written):
+    out = written / "out"
+    text, page = (out / "report.md").read_text(), (out / "report.html").read_text()
+    links = re.findall(r"!\[.*\]\(<(.*)>\)", text)
+    assert page.count("<figure>") == len(links) == len(set(links)) >= 9
+    for link in links:
+        for form in ("png", "svg", "pdf"):
+            assert (out / link).with_suffix(f".{form}").stat().st_size > 0
+    assert {(out / link).stem for link in links} == {
+        path.stem for path in (out / "figures").iterdir()
+    }
+
+
+def test_the_same_study_gives_the_same_bytes(written):
+    def content():
+        files = sorted(p for p in (written / "out").rglob("*") if p.is_file())
+        return {path: path.read_bytes() for path in files}
+
+    before = content()
+    argv = [str(written / "study"), "--output", str(written / "out"), "--ioh"]
+    assert report(argv) == 0
+    assert content() == before
+    assert {p.name for p in before} >= {
+        "report.md",
+        "report.html",
+        "summary.json",
+        "runs.csv",
+        "pairwise.csv",
+        "success.csv",
+        "targets.csv",
+    }
+
+
+def test_one_seed_says_so(tmp_path, bare):
+    path = write_study(tmp_path / "study", seeds(1))
+    assert report([str(path)]) == 0
+    text = (path / "report/report.md").read_text()
+    assert "Only one run of DE/best/1/bin, DE/rand/1/bin, GA" in text
+    assert "n = 1, no interval" in text
+    assert "nan" not in text
+    check_markdown(text)
+    check_html((path / "report/report.html").read_text())
+
+
+def test_one_experiment_has_nothing_to_compare(tmp_path, bare):
+    path = write_study(tmp_path / "study", {"ga": [1, 2]})
+    assert report([str(path)]) == 0
+    assert "nothing to compare" in (path / "report/report.md").read_text()
+    assert rows_of((path / "report/pairwise.csv").read_text()) == []
+
+
+def test_an_experiment_without_runs_is_named(tmp_path, bare, capsys):
+    path = write_study(tmp_path / "study", {"de-best": [1, 2], "ga": []})
+    assert report([str(path)]) == 0
+    assert "missing: ga: no finished run" in capsys.readouterr().err
+    assert "| GA | ga | - | 0 |" in (path / "report/report.md").read_text()
+
+
+def test_a_corrupt_history_is_named_and_left_out(tmp_path, bare, capsys):
+    path = write_study(tmp_path / "study", seeds(3))
+    damaged = path / "ga/seed-2/history.csv"
+    damaged.write_text(damaged.read_text()[:-40] + "what")
+    assert report([str(path)]) == 0
+    assert "missing: ga seed 2:" in capsys.readouterr().err
+    rows = rows_of((path / "report/runs.csv").read_text())
+    assert [row["seed"] for row in rows if row["experiment"] == "ga"] == ["1", "3"]
+    text = (path / "report/report.md").read_text()
+    assert text.index("is damaged") < text.index("## What was run")
+
+
+def test_figures_that_cannot_be_drawn_do_not_stop_the_report(tmp_path, monkeypatch):
+    def fail(data):
+        yield from ()
+        raise UserError("no such arena")
+
+    monkeypatch.setattr(module, "figures", fail)
+    path = write_study(tmp_path / "study", seeds(2))
+    assert report([str(path)]) == 0
+    text = (path / "report/report.md").read_text()
+    note = "- not all figures could be drawn: no such arena"
+    assert text.index(note) < text.index("## What was run")
+
+
+@pytest.mark.parametrize("kind", ["no runs", "nothing", "file as output"])
+def test_bad_input_is_one_line(kind, tmp_path):
+    path, argv = tmp_path / "study", []
+    if kind == "no runs":
+        write_study(path, {"ga": []})
+    elif kind == "file as output":
+        write_study(path, {"ga": [1]})
+        (tmp_path / "file").write_text("")
+        argv = ["--output", str(tmp_path / "file")]
+    result = subprocess.run(
+        [sys.executable, "-m", "evolution.report", str(path), *argv],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert result.returncode == 2
+    assert result.stdout == ""
+    assert re.fullmatch(r"error: .+\n", result.stderr)
+
+
+def test_target_and_run_rows_follow_the_study_order(large):
+    assert list(dict.fromkeys(row.experiment for row in target_rows(large))) == [*NAMES]
+    assert list(dict.fromkeys(row["experiment"] for row in run_rows(large))) == [*NAMES]
