@@ -7,6 +7,7 @@ from pathlib import Path
 from epuck_mj import files
 from epuck_mj.command_line import main, parse
 from epuck_mj.errors import UserError
+from evolution.report.blocks import to_markdown
 from evolution.report.reproduction import runs_table
 from evolution.study_data import load_study
 
@@ -40,7 +41,8 @@ def with_tables(text: str) -> str:
         _, closed, after = rest.partition(end)
         if not (found and closed):
             raise UserError(f"expected '{begin.strip()}' and '{end}' in the README")
-        text = before + begin + runs_table(load_study(path)) + "\n" + end + after
+        table = to_markdown([runs_table(load_study(path))])
+        text = before + begin + table + end + after
     return text
 
 

@@ -171,9 +171,9 @@ def test_reproduction_says_everything_once():
     assert text == reproduction(data, None, "python -m evolution.reproduce --quick")
     assert "python -m evolution.reproduce --quick" in text
     assert "ga: no finished run of seed 9" in text
-    assert "| written by hand |  |  | 195.8 | 196.9 |  |" in text
+    assert "| wall-follower, written by hand |  |  | 196.9 | 195.8 |  |" in text
     # the most believed is worth 100 less than the champion
-    assert "| DE/best/1/bin | 5 | 247.0 [246.0, 248.0] | 145.0 [145.0, 145.0]" in text
+    assert "| DE/best/1/bin | 5 | 247.0 [246.0, 248.0] | 145.0 [145.0, 145.0] |" in text
     tables = [line for line in text.splitlines() if line.startswith("|")]
     assert all(line.endswith("|") for line in tables)
     for heading in ("claims", "stored fitness hides", "differs from the original"):

@@ -2,11 +2,20 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from evolution.report.claims import DISPLAY, Claim, claims, held_out_order, verdicts
-from evolution.statistics import quartiles
-from evolution.study_data import StudyData
+from evolution.report.blocks import (
+    Block,
+    Code,
+    Heading,
+    Listing,
+    Paragraph,
+    Table,
+    to_markdown,
+)
+from evolution.report.claims import Claim, claims, held_out_order, verdicts
+from evolution.report.samples import kept, most_believed
+from evolution.report.tables import labels_of, shown_robots
+from evolution.report.words import spread
+from evolution.study_data import YARDSTICK, StudyData
 
 DIFFERENCES = (
     ("simulator", "Player/Stage, 2D", "MuJoCo, 3D; planar robot, tested on wheels"),
@@ -49,148 +58,141 @@ def reproduction(study: StudyData, wheels: StudyData | None, made_by: str) -> st
     """
     found = claims(study)
     counts = ", ".join(f"{n} {verdict}" for verdict, n in verdicts(found).items())
-    parts = [
-        "# Reproduction",
-        "A replication with another simulator and our own code, of a study that is "
-        "probably Cruz-Alvarez, Montes-Gonzalez, Mezura-Montes and Santos (MICAI "
-        "2012).",
-        f"Made by `{made_by}` from `{study.path.name}`. Brackets hold quartiles, for "
-        "A12 95 % confidence bounds; n counts runs. A claim about an order is decided "
-        "only if the bounds of A12 leave 0.5 out; the claims are not adjusted for "
-        "their number.",
-        "## What there is",
-        runs_table(study),
-    ]
-    if study.missing:
-        parts += ["Missing:", _bullets(study.missing)]
-    parts += [
-        "## The paper's claims",
-        f"{counts[:1].upper()}{counts[1:]}. These are claims about *stored* fitness, "
-        "as the paper measured it.",
+    blocks: list[Block] = [
+        Heading("Reproduction", 1),
+        Paragraph(
+            "A replication with another simulator and our own code of a study that is "
+            "probably Cruz-Alvarez, Montes-Gonzalez, Mezura-Montes and Santos (MICAI "
+            "2012). Made by"
+        ),
+        Code([made_by]),
+        Paragraph(
+            "Brackets hold quartiles, for A12 95 % confidence bounds; n counts runs. A "
+            "claim about an order is decided only where the bounds of A12 leave 0.5 "
+            "out; claims are not adjusted for their number."
+        ),
+        Heading("What there is"),
+        *_there(study),
+        Heading("The paper's claims"),
+        Paragraph(
+            f"Of {len(found)}: {counts}. They are about stored fitness, as the paper "
+            "measured it."
+        ),
         _claims(found),
-        "## The same order by fresh starts",
-        "What the paper could not see: champions on 1,000 starts that evolution never "
-        "met.",
+        Heading("The same order by fresh starts"),
+        Paragraph(
+            "What the paper could not see: champions on 1,000 starts that evolution "
+            "never met."
+        ),
+        *(_claims(held_out_order(study, robot)) for robot in shown_robots(study)),
+        Heading("What stored fitness hides"),
+        *_hidden(study),
+        Heading("From the plane to wheels"),
+        *_rungs(study),
     ]
-    parts += [_claims(held_out_order(study, robot)) for robot in study.robots]
-    parts += ["## What stored fitness hides", _hidden(study), _believed(study)]
-    parts += ["## From the plane to wheels", _rungs(study)]
     if wheels is not None:
-        parts += ["## Evolved on wheels from the start", runs_table(wheels)]
-        parts += ["Missing:", _bullets(wheels.missing)] if wheels.missing else []
-        parts += [_claims(held_out_order(wheels, wheels.robots[-1]))]
-    parts += ["## What differs from the original", _differences(study)]
-    return "\n\n".join(part for part in parts if part) + "\n"
+        blocks += [
+            Heading("Evolved on wheels from the start"),
+            *_there(wheels),
+            _claims(held_out_order(wheels, wheels.robots[-1])),
+        ]
+    blocks += [Heading("What differs from the original"), _differences(study)]
+    return to_markdown(blocks)
 
 
-def runs_table(study: StudyData) -> str:
-    """The main table: held-out fitness first, then stored, of every experiment."""
-    rows = []
-    for name, runs in study.runs.items():
-        if not runs:
-            continue
-        config = study.configs[name]
-        tests = [_quartiles(study.held_out(name, robot)) for robot in study.robots]
-        rows.append(
-            [
-                DISPLAY.get(name, name),
-                len(runs),
-                f"{config.evaluations:,}",
-                *tests,
-                _quartiles(study.stored(name)),
-            ]
-        )
+def runs_table(study: StudyData) -> Table:
+    """Held-out fitness first, then stored, of every experiment with runs."""
+    labels, robots = labels_of(study), shown_robots(study)
+    columns = ["algorithm", "n", "evaluations"]
+    columns += [f"held-out, {robot}" for robot in robots]
+    rows = [
+        [
+            labels[name],
+            str(len(runs)),
+            f"{study.configs[name].evaluations:,}",
+            *(spread(study.held_out(name, robot)) for robot in robots),
+            spread(study.stored(name)),
+        ]
+        for name, runs in study.runs.items()
+        if runs
+    ]
     if study.yardstick:
-        means = [f"{study.yardstick[robot]['mean']:.1f}" for robot in study.robots]
-        rows.append(["written by hand", "", "", *means, ""])
-    header = ["algorithm", "n", "evaluations"]
-    header += [f"held-out, {robot}" for robot in study.robots]
-    return _table([*header, "stored"], rows)
+        means = [f"{study.yardstick[robot]['mean']:.1f}" for robot in robots]
+        rows.append([f"{YARDSTICK}, written by hand", "", "", *means, ""])
+    return Table([*columns, "stored"], rows)
 
 
-def _claims(found: Sequence[Claim]) -> str:
+def _there(study: StudyData) -> list[Block]:
+    missing = [Paragraph("Missing:"), Listing(study.missing)] if study.missing else []
+    return [runs_table(study), *missing]
+
+
+def _claims(found: Sequence[Claim]) -> Table:
     rows = [[claim.text, claim.ours, claim.n, claim.verdict] for claim in found]
-    return _table(["claim", "here", "n", "verdict"], rows)
+    return Table(["claim", "here", "n", "verdict"], rows, texts=4)
 
 
-def _hidden(study: StudyData) -> str:
-    """Stored against held-out fitness of the champions, in words."""
-    robot, lines = study.robots[0], []
-    for name, runs in study.runs.items():
-        if runs:
-            luck = study.stored(name) - study.held_out(name, robot)
-            lines.append(
-                f"{DISPLAY.get(name, name)}: the champions' stored fitness is "
-                f"{_quartiles(luck)} above what 1,000 starts on {robot} say "
-                f"(n = {len(runs)})."
-            )
-    return _bullets(lines)
-
-
-def _believed(study: StudyData) -> str:
+def _hidden(study: StudyData) -> list[Block]:
     """What whoever trusts stored fitness would have taken home."""
-    rows = []
+    robot, labels, rows = study.robots[0], labels_of(study), []
     for name, runs in study.runs.items():
-        scores = [run.champion.scores.get("most_believed") for run in runs]
-        pairs = np.array([[s["stored"], s["held_out"]] for s in scores if s])
-        if len(pairs):
-            champions = study.held_out(name, study.robots[0])
+        stored, held_out = most_believed(study, name)
+        if stored.size:
             rows.append(
                 [
-                    DISPLAY.get(name, name),
-                    len(pairs),
-                    _quartiles(pairs[:, 0]),
-                    _quartiles(pairs[:, 1]),
-                    f"{pairs[:, 1].min():.1f}",
-                    _quartiles(champions),
+                    labels[name],
+                    str(len(runs)),
+                    spread(stored),
+                    spread(held_out),
+                    f"{held_out.min():.1f}",
+                    spread(study.stored(name)),
+                    spread(study.held_out(name, robot)),
                 ]
             )
-    if not rows:
-        return ""
-    table = _table(
-        ["algorithm", "n", "highest stored", "its held-out", "worst run", "champion's"],
-        rows,
-    )
-    return (
-        "The individual with the highest stored fitness of each run, which the paper "
-        f"would report, on fresh starts ({study.robots[0]}); last, the champion chosen "
-        f"on validation starts.\n\n{table}"
-    )
+    return [
+        Paragraph(
+            "The individual with the highest stored fitness of each run, which is what "
+            f"the paper reports, and what 1,000 fresh starts on {robot} say of it; "
+            "then the champion, chosen on validation starts."
+        ),
+        Table(
+            [
+                "algorithm",
+                "n",
+                "highest stored",
+                "its held-out",
+                "worst run",
+                "champion's stored",
+                "champion's held-out",
+            ],
+            rows,
+        ),
+    ]
 
 
-def _rungs(study: StudyData) -> str:
+def _rungs(study: StudyData) -> list[Block]:
     """How much of the planar fitness champions keep on wheels."""
     if len(study.robots) < 2:
-        return "Both rungs are the same robot here."
+        return [Paragraph("Both rungs are the same robot here.")]
     first, last = study.robots[0], study.robots[-1]
-    lines = []
-    for name, runs in study.runs.items():
-        if runs:
-            kept = 100 * study.held_out(name, last) / study.held_out(name, first)
-            lines.append(
-                f"{DISPLAY.get(name, name)}: {_quartiles(kept)} % of the held-out "
-                f"fitness on {first} is kept on {last} (n = {len(runs)})."
-            )
-    return _bullets(lines)
+    labels = labels_of(study)
+    shares = {
+        name: kept(study.held_out(name, last), study.held_out(name, first))
+        for name, runs in study.runs.items()
+        if runs
+    }
+    return [
+        Listing(
+            [
+                f"{labels[name]}: {spread(share, 100)} % of the held-out fitness on "
+                f"{first} is kept on {last}, n = {len(study.runs[name])}."
+                for name, share in shares.items()
+            ]
+        )
+    ]
 
 
-def _differences(study: StudyData) -> str:
+def _differences(study: StudyData) -> Table:
     config = next(iter(study.configs.values())).model_dump()
     rows = [[what, paper, here.format(**config)] for what, paper, here in DIFFERENCES]
-    return _table(["", "paper", "here"], rows)
-
-
-def _quartiles(sample: np.ndarray) -> str:
-    q = quartiles(sample)
-    if sample.size == 1:
-        return f"{q.median:.1f}"
-    return f"{q.median:.1f} [{q.lower:.1f}, {q.upper:.1f}]"
-
-
-def _bullets(lines: Sequence[str]) -> str:
-    return "\n".join(f"- {line}" for line in lines)
-
-
-def _table(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
+    return Table(["", "paper", "here"], rows, texts=3)

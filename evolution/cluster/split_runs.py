@@ -1,0 +1,107 @@
+"""Split runs: evolution goes on here, one run at a time; trials are lived elsewhere."""
+
+import math
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+
+import numpy as np
+
+from epuck_mj.control import TaskParameters, Trials
+from epuck_mj.controller import Controller
+from epuck_mj.model import load_scene
+from evolution.cluster.connection import Cluster, ClusterLost
+from evolution.cluster.world import World, world_of
+from evolution.config import ExperimentConfig
+from evolution.evaluation import CAPACITY, BatchEngine, Race, chunks, joined
+from evolution.execution import Means
+from evolution.jobs import Event, Job, failure_log, failure_of, generations
+
+CHUNKS_PER_THREAD = 2
+"""Parts of a generation for each thread: more even out, fewer cost less to send."""
+
+ENGINES_KEPT = 4
+"""Engines that a thread of a worker keeps for its next chunks."""
+
+
+def split_runs(jobs: Sequence[Job], cluster: Cluster, racing: bool) -> Iterator[Event]:
+    """One job after the other, each spread over all workers."""
+    for job in jobs:
+        failure = None
+        try:
+            means = Means(ClusterEngine(cluster, job.config), racing=racing)
+            with closing(generations(job, means)) as steps:
+                for evaluations in steps:
+                    yield Event(job, evaluations)
+            failure_log(job.directory).unlink(missing_ok=True)
+        except ClusterLost:
+            raise
+        except Exception as error:
+            failure = failure_of(job, error)
+        yield Event(job, ended=True, failure=failure)
+
+
+class ClusterEngine:
+    """Trials in parts, wherever a thread is free; see `evaluation.Engine`."""
+
+    def __init__(self, cluster: Cluster, config: ExperimentConfig):
+        """Find out what has to be the same everywhere.
+
+        Raises:
+            UserError: if robot or arena cannot be used.
+        """
+        self._cluster = cluster
+        self._world = world_of(config)
+        self._task = config.task
+
+    def __str__(self) -> str:
+        """Its name in a run's provenance."""
+        return "cluster"
+
+    def run(
+        self, controller: Controller, starts: np.ndarray, race: Race | None = None
+    ) -> Trials:
+        """See `Engine.run`.
+
+        Raises:
+            UserError: if the cluster is lost, or a worker refuses.
+        """
+        n_chunks = CHUNKS_PER_THREAD * max(1, self._cluster.n_threads())
+        most = min(CAPACITY, math.ceil(len(starts) / n_chunks))
+        # individuals stay whole: they win or lose by all their trials
+        whole = 1 if race is None else race.trials
+        futures = [
+            self._cluster.submit(
+                "trials",
+                _trials,
+                self._world,
+                self._task,
+                controller[chunk],
+                starts[chunk],
+                None if race is None else race[chunk],
+            )
+            for chunk in chunks(len(starts), whole, most)
+        ]
+        return joined(self._cluster.results(futures))
+
+
+def _trials(
+    world: World,
+    task: TaskParameters,
+    controller: Controller,
+    starts: np.ndarray,
+    race: Race | None,
+) -> Trials:
+    """On a worker: `Engine.run` of a chunk."""
+    # a thread's own: an engine runs one batch at a time
+    engines = _kept.__dict__.setdefault("engines", {})
+    if (world, task) not in engines:
+        world.refuse_another()
+        if len(engines) == ENGINES_KEPT:
+            engines.clear()
+        scene = load_scene(world.robot, world.arena, world.control_step)
+        engines[world, task] = BatchEngine(scene, task, threads=1)
+    return engines[world, task].run(controller, starts, race)
+
+
+_kept = threading.local()

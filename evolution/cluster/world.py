@@ -1,0 +1,74 @@
+"""What has to be the same on a worker as here, or its bits would be others."""
+
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Self
+
+from distributed import get_worker
+
+from epuck_mj.errors import UserError
+from epuck_mj.model import load_scene
+from evolution.config import ExperimentConfig
+from evolution.results import WHEELED_ROBOT
+
+DECIDING = ("epuck-mj", "mujoco", "numpy", "cmaes")
+"""Packages whose version decides over the bits."""
+
+
+@dataclass(frozen=True)
+class World:
+    """What decides over the bits of a trial, but for controller, start and task.
+
+    Attributes:
+        robot: shipped robot, or the path of an MJCF file.
+        arena: shipped arena, or the path of an MJCF file.
+        control_step: duration of a control step [s].
+        facts: what has to be the same everywhere, and what it is here.
+    """
+
+    robot: str
+    arena: str
+    control_step: float
+    facts: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def here(cls, robot: str, arena: str, control_step: float) -> Self:
+        """As it is on this machine.
+
+        Raises:
+            UserError: if robot or arena cannot be used.
+        """
+        facts = {package: version(package) for package in DECIDING}
+        for name in (robot, WHEELED_ROBOT):
+            scene = load_scene(name, arena, control_step)
+            for part, sha256 in scene.sha256.items():
+                facts[f"{part} of '{name}' in '{arena}'"] = sha256[:12]
+        return cls(robot, arena, control_step, tuple(facts.items()))
+
+    def refuse_another(self) -> None:
+        """On a worker: refuse to give other bits than the machine that asks would get.
+
+        Raises:
+            UserError: naming what differs.
+        """
+        here = World.here(self.robot, self.arena, self.control_step)
+        ours, theirs = dict(here.facts), dict(self.facts)
+        differing = [
+            f"{name} (there {ours.get(name)}, here {theirs.get(name)})"
+            for name in {**theirs, **ours}
+            if ours.get(name) != theirs.get(name)
+        ]
+        if differing:
+            raise UserError(
+                f"worker {get_worker().address} would give other results; these "
+                f"differ: {', '.join(differing)}"
+            )
+
+
+def world_of(config: ExperimentConfig) -> World:
+    """The world of a run, as it is on this machine.
+
+    Raises:
+        UserError: if robot or arena cannot be used.
+    """
+    return World.here(config.robot, config.arena, config.control_step)

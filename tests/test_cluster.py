@@ -1,0 +1,474 @@
+"""Runs on a Dask cluster: real schedulers and workers, some of which are killed."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from distributed import Client
+
+from epuck_mj.errors import UserError
+from evolution.cluster import carry_out_on_cluster, connection, world
+from evolution.config import ExperimentConfig, find_config, load_config
+from evolution.execution import Means
+from evolution.jobs import Event, Job, carry_out, generations
+
+pytestmark = pytest.mark.slow
+
+TIMEOUT = 60
+"""Seconds for what takes a few on a machine that does nothing else."""
+
+SMALL = {"steps": 20, "trials": 2, "evaluations": 100}
+LONG = {"steps": 100, "trials": 2, "evaluations": 300}
+ENDLESS = {"steps": 100, "trials": 2, "evaluations": 1_000_000}
+
+REPRODUCED = ("history.csv", "champion.json")
+
+# pictures are not drawn and few starts held out, here and by every worker
+QUICKER = """
+from evolution import champion, held_out, results
+
+QUICKER = [
+    (results, "_draw_fitness", lambda *_: None),
+    (results, "_show", lambda *_: None),
+    (champion, "N_VALIDATION", 10),
+    (held_out.Judge.starts, "__defaults__", (10,)),
+    (held_out.Judge.test, "__defaults__", (10,)),
+]
+for place, name, value in QUICKER:
+    assert hasattr(place, name)
+"""
+AT_ONCE = QUICKER + "    setattr(place, name, value)"
+
+
+# jobs
+
+
+def config(name: str, seed: int, **keys: Any) -> ExperimentConfig:
+    fields: dict[str, Any] = load_config(find_config(name)).model_dump()
+    fields |= {"seed": seed} | keys
+    fields["optimizer"]["population"] = 10
+    return ExperimentConfig.model_validate(fields)
+
+
+def jobs(folder: Path, *configs: ExperimentConfig) -> list[Job]:
+    argv = ("study", "--cluster")
+    return [
+        Job(str(c.optimizer.algorithm), c, folder / f"{i}", argv)
+        for i, c in enumerate(configs)
+    ]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def quicker():
+    """Runs in this process that take no longer than those of the workers."""
+    names: dict[str, Any] = {}
+    exec(QUICKER, names)
+    with pytest.MonkeyPatch.context() as patch:
+        for place, name, value in names["QUICKER"]:
+            patch.setattr(place, name, value)
+        yield
+
+
+@pytest.fixture(scope="module")
+def preload(tmp_path_factory) -> Path:
+    """A script that a worker runs first."""
+    path = tmp_path_factory.mktemp("preload") / "quicker.py"
+    path.write_text(AT_ONCE)
+    return path
+
+
+class References:
+    """Runs on this machine, each done when it is first asked for."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        self.done: dict[str, Path] = {}
+
+    def of(self, job: Job) -> Path:
+        text = job.config.to_yaml()
+        if text not in self.done:
+            path = self.folder / str(len(self.done))
+            carry_out(replace(job, directory=path), Means(threads=1), lambda _: None)
+            self.done[text] = path
+        return self.done[text]
+
+
+@pytest.fixture(scope="module")
+def references(tmp_path_factory) -> References:
+    return References(tmp_path_factory.mktemp("references"))
+
+
+def assert_as_here(job: Job, references: References) -> None:
+    reference = references.of(job)
+    for name in REPRODUCED:
+        ours = (job.directory / name).read_bytes()
+        assert ours == (reference / name).read_bytes(), name
+    names, expected = (
+        sorted(path.name for path in folder.iterdir())
+        for folder in (job.directory, reference)
+    )
+    assert names == expected
+    provenance = json.loads((job.directory / "provenance.json").read_text())
+    assert provenance["finished"]
+    assert provenance["argv"] == list(job.argv)
+
+
+def failures(events: list[Event]) -> dict[str, str | None]:
+    """Of the jobs that have ended, by the name of their directory."""
+    return {event.job.directory.name: event.failure for event in events if event.ended}
+
+
+# processes
+
+
+class Fleet:
+    """A scheduler and workers on this machine, each a process that can be killed."""
+
+    def __init__(self, folder: Path, preload: Path):
+        self.folder = folder
+        self.preload = preload
+        self.scheduler: subprocess.Popen | None = None
+        self.workers: list[subprocess.Popen] = []
+
+    @property
+    def address(self) -> str:
+        return json.loads((self.folder / "scheduler.json").read_text())["address"]
+
+    def start(self, n_workers: int) -> str:
+        """Have at least so many workers, ready; the scheduler's address."""
+        file = self.folder / "scheduler.json"
+        if self.scheduler is None or self.scheduler.poll() is not None:
+            file.unlink(missing_ok=True)
+            options = "--host 127.0.0.1 --port 0 --no-dashboard --idle-timeout 300"
+            self.scheduler = self._started("scheduler", file, *options.split())
+        self.workers = [w for w in self.workers if w.poll() is None]
+        while len(self.workers) < n_workers:
+            options = "--nthreads 1 --no-nanny --no-dashboard --death-timeout 60"
+            preload = ["--preload", str(self.preload)]
+            self.workers.append(
+                self._started("worker", file, *options.split(), *preload)
+            )
+        wait_until(lambda: file.exists() and file.stat().st_size > 0)
+        with self.client() as client:
+            wait_until(lambda: len(client.nthreads()) == len(self.workers))
+        return self.address
+
+    def _started(self, what: str, file: Path, *options: str) -> subprocess.Popen:
+        module = f"distributed.cli.dask_{what}"
+        with (self.folder / "log.txt").open("ab") as log:
+            return subprocess.Popen(
+                [sys.executable, "-m", module, "--scheduler-file", file, *options],
+                cwd=self.folder,
+                env=os.environ | {"DASK_TEMPORARY_DIRECTORY": str(self.folder)},
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+            )
+
+    @contextmanager
+    def client(self) -> Iterator[Any]:
+        with Client(self.address, timeout=TIMEOUT, set_as_default=False) as client:
+            yield client
+
+    def busy(self, client: Any) -> list[int]:
+        """Process ids of the workers that are at work on a task."""
+        tasks = client.run(lambda dask_worker: dask_worker.state.executing_count)
+        pids = client.run(os.getpid)
+        return [pids[address] for address, count in tasks.items() if count]
+
+    def stop(self) -> None:
+        for process in filter(None, [*self.workers, self.scheduler]):
+            process.kill()
+            process.wait(TIMEOUT)
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory, preload):
+    fleet = Fleet(tmp_path_factory.mktemp("fleet"), preload)
+    yield fleet
+    fleet.stop()
+
+
+def wait_until(moment: Callable[[], object]) -> None:
+    deadline = time.monotonic() + TIMEOUT
+    while not moment():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+@contextmanager
+def meanwhile(act: Callable[[], None]) -> Iterator[None]:
+    """Do something beside the block, which must have been done at its end."""
+    errors: list[BaseException] = []
+
+    def acting() -> None:
+        try:
+            act()
+        except BaseException as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=acting, daemon=True)
+    thread.start()
+    yield
+    thread.join(TIMEOUT)
+    assert not thread.is_alive()
+    assert not errors
+
+
+def kill_a_busy_worker(fleet: Fleet, pattern: str = "*") -> None:
+    """Kill it when the workers have a file of that name."""
+    with fleet.client() as client:
+        wait_until(lambda: any(fleet.folder.rglob(pattern)))
+        wait_until(lambda: fleet.busy(client))
+        victim = fleet.busy(client)[0]
+        os.kill(victim, signal.SIGKILL)
+        wait_until(lambda: len(client.nthreads()) == len(fleet.workers) - 1)
+
+
+# results
+
+
+def test_who_gives_up_frees_the_workers_and_keeps_what_is_done(
+    fleet, references, tmp_path
+):
+    address = fleet.start(2)
+    todo = jobs(tmp_path, config("ga", 1, **SMALL), config("ga", 2, **ENDLESS))
+    events = carry_out_on_cluster(todo, address, split=False, racing=True)
+    assert next(events) == Event(todo[0], ended=True)
+    started = time.monotonic()
+    assert hasattr(events, "close")
+    events.close()  # pyright: ignore[reportAttributeAccessIssue]
+    assert time.monotonic() - started < 5
+    with fleet.client() as client:
+        wait_until(lambda: not fleet.busy(client))
+    assert_as_here(todo[0], references)
+    assert not (todo[1].directory / "config.yaml").exists()
+
+
+def test_whole_runs_are_as_here_though_a_worker_is_killed(fleet, references, tmp_path):
+    address = fleet.start(2)
+    todo = jobs(
+        tmp_path,
+        config("ga", 1, **LONG),
+        config("ga", 1, **SMALL),
+        config("de-rand", 3, **SMALL, arena="nowhere.xml"),
+        config("ga", 4, **SMALL),
+    )
+    todo[3].directory.mkdir()
+    (todo[3].directory / "notes.txt").write_text("somebody's")
+    with meanwhile(lambda: kill_a_busy_worker(fleet, "checkpoint.npz")):
+        events = list(carry_out_on_cluster(todo, address, split=False, racing=True))
+    failed = failures(events)
+    # those that cannot be done do not keep the others from it
+    assert "no arena 'nowhere.xml'" in str(failed.pop("2"))
+    assert "is not empty" in str(failed.pop("3"))
+    assert failed == {"0": None, "1": None}
+    for job in todo[:2]:
+        assert_as_here(job, references)
+
+
+def test_what_was_begun_is_gone_on_with(fleet, references, tmp_path):
+    address = fleet.start(1)
+    (job,) = jobs(tmp_path, config("ga", 1, **SMALL))
+    steps = generations(job, Means(threads=1))
+    assert [next(steps) for _ in range(3)] == [10, 20, 30]
+    steps.close()
+    checkpoint = (job.directory / "checkpoint.npz").read_bytes()
+    assert checkpoint
+    (event,) = carry_out_on_cluster([job], address, split=False, racing=True)
+    assert (event.ended, event.failure) == (True, None)
+    assert_as_here(job, references)
+    provenance = json.loads((job.directory / "provenance.json").read_text())
+    assert [entry["argv"] for entry in provenance["resumed"]] == [list(job.argv)]
+    rows = (job.directory / "timing.csv").read_text().splitlines()
+    assert [row.split(",")[0] for row in rows[1:]] == [str(i) for i in range(10)]
+
+
+# workers and schedulers that are of no use
+
+
+@pytest.mark.parametrize("split", [False, True])
+def test_a_worker_of_other_versions_refuses(split, fleet, tmp_path, monkeypatch):
+    address = fleet.start(1)
+    monkeypatch.setattr(
+        world, "version", lambda name: "9.9" if name == "mujoco" else "0.1.0"
+    )
+    todo = jobs(tmp_path, config("ga", 1, **SMALL))
+    (event,) = carry_out_on_cluster(todo, address, split, racing=True)
+    assert "would give other results" in str(event.failure)
+    assert "mujoco (there 3." in str(event.failure)
+    assert "here 9.9)" in str(event.failure)
+    assert "\n" not in str(event.failure)
+
+
+def test_split_runs_are_as_here_though_a_worker_is_killed(fleet, references, tmp_path):
+    address = fleet.start(2)
+    todo = jobs(
+        tmp_path,
+        config("de-rand", 3, **SMALL, arena="nowhere.xml"),
+        config("ga", 1, **LONG),
+    )
+    with meanwhile(lambda: kill_a_busy_worker(fleet)):
+        events = list(carry_out_on_cluster(todo, address, split=True, racing=True))
+    failed = failures(events)
+    assert "no arena 'nowhere.xml'" in str(failed.pop("0"))
+    assert failed == {"1": None}
+    assert_as_here(todo[1], references)
+    evaluations = [event.evaluations for event in events if not event.ended]
+    assert evaluations == list(range(10, 301, 10))
+    provenance = json.loads((todo[1].directory / "provenance.json").read_text())
+    assert provenance["engine"] == "cluster"
+
+
+def refusal(address: str, tmp_path: Path, split: bool = False) -> str:
+    """What is said of a cluster that is of no use."""
+    todo = jobs(tmp_path, config("ga", 1, **ENDLESS), config("ga", 2, **ENDLESS))
+    started = time.monotonic()
+    with pytest.raises(UserError) as info:
+        list(carry_out_on_cluster(todo, address, split, racing=True))
+    assert time.monotonic() - started < TIMEOUT / 2
+    assert "\n" not in str(info.value)
+    return str(info.value)
+
+
+@pytest.mark.parametrize("split", [False, True])
+def test_a_lost_scheduler_is_noticed(split, fleet, tmp_path, monkeypatch):
+    monkeypatch.setattr(connection, "SCHEDULER_PATIENCE", 3.0)
+    address = fleet.start(1)
+
+    def kill_the_scheduler() -> None:
+        with fleet.client() as client:
+            wait_until(lambda: fleet.busy(client))
+        fleet.scheduler.kill()
+
+    with meanwhile(kill_the_scheduler):
+        assert f"lost the scheduler at '{address}'" in refusal(address, tmp_path, split)
+    for worker in fleet.workers:
+        worker.kill()
+        worker.wait()
+
+
+@pytest.mark.parametrize("split", [False, True])
+def test_a_scheduler_without_workers(split, fleet, tmp_path, monkeypatch):
+    monkeypatch.setattr(connection, "WORKERS_PATIENCE", 1.0)
+    for worker in fleet.workers:
+        worker.kill()
+        worker.wait()
+    address = fleet.start(0)
+    message = refusal(address, tmp_path, split)
+    assert "has had no worker for 1 s" in message
+    assert f"dask worker {address}" in message
+
+
+def test_nobody_or_a_stranger_at_the_address(tmp_path, monkeypatch):
+    monkeypatch.setattr(connection, "SCHEDULER_PATIENCE", 1.0)
+    with socket.create_server(("127.0.0.1", 0)) as mute:
+        port = mute.getsockname()[1]
+        address = f"tcp://127.0.0.1:{port}"
+        assert f"no Dask scheduler at '{address}'" in refusal(address, tmp_path)
+    assert f"no Dask scheduler at '{address}'" in refusal(address, tmp_path)
+    assert "TLS" in refusal(f"tls://127.0.0.1:{port}", tmp_path)
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "",
+        "local",
+        "local:",
+        "local:0",
+        "local:1000",
+        "host:8786",
+        "tcp://host",
+        "tcp:/",
+    ],
+)
+def test_what_is_no_address_is_refused(address, tmp_path):
+    message = refusal(address, tmp_path)
+    assert "expected as cluster tcp://host:8786" in message
+    assert message.endswith(f"got '{address}'")
+
+
+def test_nothing_to_do_needs_no_cluster():
+    assert not list(carry_out_on_cluster([], "tcp://127.0.0.1:9", False, True))
+
+
+def test_without_the_extra_there_is_one_clear_line(monkeypatch):
+    for name in [name for name in sys.modules if name.startswith("evolution.cluster")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(UserError, match=r"pip install 'epuck-mj\[cluster\]'$"):
+        __import__("evolution.cluster")
+
+
+# the command line
+
+
+def test_a_study_on_workers_of_its_own(preload, references, tmp_path):
+    (tmp_path / "mine.yaml").write_text(config("ga", 1, **SMALL).to_yaml())
+    (tmp_path / "tiny.yaml").write_text(yaml.safe_dump({"experiments": ["mine.yaml"]}))
+    options = "tiny.yaml --seeds 1-2 --output out --cluster local:2"
+    process = subprocess.run(
+        [sys.executable, "-W", "error", "-m", "evolution.study", *options.split()],
+        cwd=tmp_path,
+        env=os.environ
+        | {"DASK_DISTRIBUTED__WORKER__PRELOAD": repr([str(preload)])}
+        | {"DASK_TEMPORARY_DIRECTORY": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
+    )
+    assert (process.returncode, process.stderr) == (0, "")
+    assert "2 of 2 runs are finished" in process.stdout
+    assert len(process.stdout.splitlines()) == 4
+    folder = tmp_path / "out" / "mine" / "seed-1"
+    argv = tuple(options.split())
+    assert_as_here(Job("mine", config("ga", 1, **SMALL), folder, argv), references)
+
+
+def test_ctrl_c_ends_workers_of_its_own(tmp_path):
+    study = {"experiments": ["ga"], "common": ENDLESS}
+    (tmp_path / "tiny.yaml").write_text(yaml.safe_dump(study))
+    options = "tiny.yaml --seeds 1-2 --output out --cluster local:2 --split"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "evolution.study", *options.split()],
+        cwd=tmp_path,
+        env=os.environ | {"DASK_TEMPORARY_DIRECTORY": str(tmp_path)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        wait_until((tmp_path / "out" / "ga" / "seed-1" / "history.csv").exists)
+        # as a terminal does: to everybody
+        os.killpg(process.pid, signal.SIGINT)
+        _, stderr = process.communicate(timeout=TIMEOUT)
+        assert process.returncode == 130
+        assert len(stderr.splitlines()) == 1
+        assert stderr.startswith("Interrupted; go on with: ")
+
+        def nobody_left() -> bool:
+            try:
+                os.killpg(process.pid, 0)
+            except ProcessLookupError:
+                return True
+            return False
+
+        wait_until(nobody_left)
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
