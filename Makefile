@@ -4,7 +4,7 @@ BIN := .venv/bin
 INSTALLED := .venv/.installed
 RUN := runs/de-best-seed-1
 
-.PHONY: run test bench convergence figures clean
+.PHONY: run test bench convergence racing results figures clean
 
 run: $(INSTALLED)
 	@if [ -f $(RUN)/config.yaml ]; then \
@@ -25,14 +25,17 @@ bench: $(INSTALLED)
 convergence: $(INSTALLED)
 	$(BIN)/python -m benchmarks.convergence
 
-# the README's pictures; the first needs EGL or OSMesa
-figures: $(INSTALLED) $(RUN)/champion.json
-	$(BIN)/python -m epuck_mj.render $(RUN)/champion.json --output docs/champion.png
-	cp $(RUN)/fitness.png docs/fitness.png
-	cp $(RUN)/trajectory.png docs/trajectory.png
+racing: $(INSTALLED)
+	$(BIN)/python -m benchmarks.racing --threads 1 --json results/racing.json
 
-$(RUN)/champion.json:
-	$(MAKE) run
+# what git keeps of the studies in runs/, and everything that is made of it
+results: $(INSTALLED)
+	$(BIN)/python -m benchmarks.publish
+
+# the README's picture in 3D, which needs EGL or OSMesa; results draws the others
+figures: $(INSTALLED)
+	$(BIN)/python -m epuck_mj.render results/paper/de-best/seed-1/champion.json \
+	  --output docs/champion.png
 
 $(INSTALLED): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv

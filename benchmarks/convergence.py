@@ -27,7 +27,8 @@ from epuck_mj.tasks import START_CLEARANCE
 from epuck_mj.wall_follower import WallFollower
 
 HERE = Path(__file__).resolve().parent
-CHAMPIONS = HERE.parent / "results" / "default"
+CHAMPIONS = HERE.parent / "results" / "paper" / "de-best"
+SEEDS = (1, 2, 3)
 FRAGILE = HERE / "controllers" / "fragile.json"
 REPORT = HERE / "convergence.md"
 TASK = TaskParameters()
@@ -100,8 +101,8 @@ def configurations(robot: str, shipped: float) -> list[Configuration]:
 
 def controllers(n: int) -> dict[str, BatchPolicy]:
     """The fixed set, each as a policy for `n` robots."""
-    files = sorted(CHAMPIONS.glob("*/champion.json"))
-    evolved = {path.parent.name: load(path) for path in files}
+    files = [CHAMPIONS / f"seed-{seed}" / "champion.json" for seed in SEEDS]
+    evolved = {f"de-best-{path.parent.name}": load(path) for path in files}
     evolved["fragile"] = load(FRAGILE)
     policies: dict[str, BatchPolicy] = {"by hand": WallFollower()}
     for name, file in evolved.items():
@@ -202,7 +203,7 @@ def _cells(fitness: Mapping[str, float]) -> str:
 HEADER = """# Which physics step is fine enough
 
 Made by `python -m benchmarks.convergence`. Mean fitness of 300 over {starts} starts of
-the hand-written wall follower, of evolved champions (results/default) and of a fragile
+the hand-written wall follower, of champions of results/paper, and of a fragile
 controller, evolved with a softer drive, that rides 0.4 mm off the wall. The reference
 is the shipped configuration at a fifth of its step. Deviation: the largest of any
 controller; up to {margin:.1%} passes, half of what the tests allow. Cost: CPU time of a

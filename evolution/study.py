@@ -86,12 +86,13 @@ def study(argv: Sequence[str]) -> int:
     failed: list[Job] = []
     try:
         with interruptible():
-            events = _shown(everything, jobs, _events(jobs, options))
-            failed.extend(event.job for event in events if event.failure is not None)
+            # first: a study cut short has it, too
             try:
                 _measure_yardstick(directory, config)
             except UserError as error:
                 print(f"{YARDSTICK} could not be tested: {error}", file=sys.stderr)
+            events = _shown(everything, jobs, _events(jobs, options))
+            failed.extend(event.job for event in events if event.failure is not None)
     except Interrupted as interruption:
         print(
             f"Interrupted; go on with: {command(MODULE, *argv)}",

@@ -1,37 +1,75 @@
-"""The shipped champions belong to the shipped models and to their own provenance."""
+"""The shipped evidence: it belongs to the shipped models, and to what is said of it."""
 
-import csv
 import hashlib
 import json
 from pathlib import Path
 
 import pytest
 
-from epuck_mj.controller import load
+from benchmarks.publish import shipped, with_tables
 from epuck_mj.model import MODELS
+from evolution.study_config import StudyConfig, find_study
+from evolution.study_data import load_study
+from evolution.verify import verify
 
-RUNS = sorted((MODELS.parent / "results" / "default").iterdir())
+ROOT = MODELS.parent
+RESULTS = ROOT / "results"
+STUDIES = shipped(RESULTS)
+RUNS = sorted(path.parent for path in RESULTS.glob("*/*/seed-*/champion.json"))
+SIZE_MAX = 20e6
 
 
-@pytest.mark.parametrize("run", RUNS, ids=lambda path: path.name)
-def test_hashes_are_those_of_the_models_here(run: Path):
-    models = {"arena": "arena.xml", "robot": "epuck_planar.xml"}
+@pytest.mark.parametrize("run", RUNS, ids=lambda p: p.relative_to(RESULTS).as_posix())
+def test_a_run_is_of_the_models_and_the_code_in_git(run: Path):
+    provenance = json.loads((run / "provenance.json").read_text())
+    champion = json.loads((run / "champion.json").read_text())
+    names = {"arena": "arena.xml", "robot": f"{champion['scene']['robot']}.xml"}
     expected = {
         part: hashlib.sha256((MODELS / name).read_bytes()).hexdigest()
-        for part, name in models.items()
+        for part, name in names.items()
     }
-    provenance = json.loads((run / "provenance.json").read_text())
     assert provenance["mjcf_sha256"] == expected
-    assert load(run / "champion.json").scene["mjcf_sha256"] == expected
+    assert champion["scene"]["mjcf_sha256"] == expected
     assert provenance["git"]["modified"] is False
     assert provenance["finished"]
 
 
-@pytest.mark.parametrize("run", RUNS, ids=lambda path: path.name)
-def test_default_experiment_finds_wall_followers(run: Path):
-    scores = load(run / "champion.json").scores
-    assert scores["held_out"]["epuck"]["mean"] >= 120
-    with (run / "history.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    assert rows[-1]["evaluations"] == "30000"
-    assert float(rows[-1]["best"]) >= scores["stored"]
+@pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.name)
+def test_a_study_is_sound_and_spent_the_whole_budget(path: Path):
+    study = load_study(path)
+    assert study.steps == 300
+    assert study.robots[-1] == "epuck"
+    assert not [line for line in study.missing if "not finished" in line]
+    for name, runs in study.runs.items():
+        for run in runs:
+            spent = run.history["evaluations"][-1]
+            assert 30_000 - 1000 < spent <= 30_000, name
+            assert run.history["best"].max() >= run.stored
+
+
+@pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.name)
+def test_a_study_is_the_shipped_config(path: Path):
+    now = StudyConfig.load(find_study(path.name))
+    assert StudyConfig.from_yaml(path / "study.yaml").experiments == now.experiments
+
+
+def test_the_main_experiment_finds_wall_followers():
+    study = load_study(RESULTS / "paper")
+    assert (study.held_out("de-best", "epuck") >= 120).all()
+
+
+def test_a_shipped_champion_scores_the_same_on_this_machine(capsys):
+    """To the last bit where version and processor are those of the run."""
+    same = verify([str(RESULTS / "paper" / "de-best" / "seed-1")]) == 0
+    said = capsys.readouterr().out
+    assert same or "since then: " in said
+    assert "nothing that is recorded changed" not in said
+
+
+def test_the_readme_shows_what_is_shipped():
+    text = (ROOT / "README.md").read_text()
+    assert with_tables(text, RESULTS) == text
+
+
+def test_what_is_shipped_is_small():
+    assert sum(p.stat().st_size for p in RESULTS.rglob("*") if p.is_file()) < SIZE_MAX

@@ -1,0 +1,93 @@
+"""Ships the studies in runs/: `python -m benchmarks.publish`.
+
+Copies what of each finished run is small enough for git, reports it, holds the paper's
+claims against it, and puts its table into the README.
+"""
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from epuck_mj import files
+from epuck_mj.command_line import main, parse
+from epuck_mj.errors import UserError
+from evolution.report.blocks import to_markdown
+from evolution.report.reproduction import runs_table
+from evolution.reproduce import reproduce
+from evolution.run_directory import RunDirectory
+from evolution.study_data import load_study
+from evolution.study_directory import StudyDirectory
+
+STUDIES = ("paper", "wheels")
+"""Folders of runs/ and results/, and what stands between the README's markers."""
+
+README = Path("README.md")
+
+
+@dataclass(frozen=True)
+class Options:
+    """Ship the finished runs of runs/paper and runs/wheels; to be called at the top.
+
+    Without these folders, everything is made anew from what was shipped before.
+    """
+
+
+def publish(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status."""
+    parse(Options, "python -m benchmarks.publish", argv, Options())
+    for name in STUDIES:
+        if (Path("runs") / name).is_dir():
+            ship(Path("runs") / name, Path("results") / name)
+    paper, *others = (str(path) for path in shipped(Path("results")))
+    wheels = [argument for path in others for argument in ("--wheels", path)]
+    reproduce(["--study", paper, *wheels, "--output", "results"])
+    text = with_tables(README.read_text(encoding="utf-8"), Path("results"))
+    files.write_text(README, text)
+    return 0
+
+
+def shipped(results: Path) -> list[Path]:
+    """The studies that are there."""
+    return [results / name for name in STUDIES if (results / name).is_dir()]
+
+
+def ship(source: Path, target: Path) -> None:
+    """Copy the study and its finished runs, without what can be made anew."""
+    study, copies = StudyDirectory(source), StudyDirectory(target)
+    names = study.stored_config().experiments
+    pairs = [(study.config, copies.config), (study.yardstick, copies.yardstick)]
+    for name in names:
+        for seed in study.seeds(name):
+            run, copy = study.run(name, seed), copies.run(name, seed)
+            if run.finished:
+                pairs += zip(_kept(run), _kept(copy), strict=True)
+    for path, copy in pairs:
+        if path.exists():
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, copy)
+
+
+def _kept(run: RunDirectory) -> list[Path]:
+    return [run.config, run.history, run.champion, run.timing, run.provenance]
+
+
+def with_tables(text: str, results: Path) -> str:
+    """The README's text with every table as the shipped studies have it now.
+
+    Raises:
+        UserError: if a marker is missing.
+    """
+    for path in shipped(results):
+        begin, end = f"<!-- {path.name} -->\n", f"<!-- end of {path.name} -->"
+        before, found, rest = text.partition(begin)
+        _, closed, after = rest.partition(end)
+        if not (found and closed):
+            raise UserError(f"expected '{begin.strip()}' and '{end}' in the README")
+        table = to_markdown([runs_table(load_study(path))])
+        text = before + begin + table + end + after
+    return text
+
+
+if __name__ == "__main__":
+    main(publish)
