@@ -21,7 +21,11 @@ DIFFERENCES = (
     ("simulator", "Player/Stage, 2D", "MuJoCo, 3D; planar robot, tested on wheels"),
     ("steps of a trial", "not legible", "{steps} of {control_step} s"),
     ("arena", "square, as in their laboratory", "1.0 m square"),
-    ("speeds", "not said", "{v_max:.4g} m/s and {w_max:.4g} rad/s, the hardware's limits"),
+    (
+        "speeds",
+        "not said",
+        "{v_max:.4g} m/s and {w_max:.4g} rad/s, the hardware's limits",
+    ),
     ("sensors", "0 near to 1 free, 4 cm", "the same, linear, without noise"),
     (
         "fitness",
