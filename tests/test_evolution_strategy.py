@@ -179,7 +179,7 @@ def test_lineages_do_not_meet():
     assert np.any(a.population[0] != b.population[0])
 
 
-@pytest.mark.parametrize("rule", set(BOUNDS_RULES) - {"none"})
+@pytest.mark.parametrize("rule", sorted(set(BOUNDS_RULES) - {"none"}))
 def test_every_rule_keeps_offspring_inside(rule):
     optimizer = make(sigma=10.0, bounds_rule=rule)
     for _ in range(20):
