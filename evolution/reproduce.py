@@ -10,7 +10,9 @@ from pathlib import Path
 from epuck_mj import files
 from epuck_mj.command_line import command, main, parse
 from epuck_mj.errors import UserError
+from epuck_mj.fitness import STEP_FITNESS
 from evolution.report.command import report
+from evolution.report.first_generation import first_generation
 from evolution.report.reproduction import reproduction
 from evolution.study import study
 from evolution.study_data import load_study
@@ -71,7 +73,9 @@ def reproduce(argv: Sequence[str]) -> int:
     main_study, wheels = load_study(places[0]), None
     if len(places) > 1 and places[1] is not None:
         wheels = load_study(places[1])
-    text = reproduction(main_study, wheels, command(MODULE, *argv))
+    config = next(iter(main_study.configs.values()))
+    unevolved = [first_generation(config, name) for name in STEP_FITNESS]
+    text = reproduction(main_study, wheels, unevolved, command(MODULE, *argv))
     path = options.output / "REPRODUCTION.md"
     with files.writing(options.output):
         options.output.mkdir(parents=True, exist_ok=True)

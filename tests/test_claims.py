@@ -19,10 +19,14 @@ from evolution.report.claims import (
     mean_to_best,
     verdicts,
 )
+from evolution.report.first_generation import FirstGeneration, first_generation
 from evolution.report.reproduction import reproduction
 from evolution.study_data import RunData, StudyData
 
 NAMES = ("de-best", "de-rand", "ga")
+
+
+UNEVOLVED = [FirstGeneration("literal", 150, 249.0, 248.0, {"circler": 1.0})]
 
 
 def run(seed: int, best: float, mean: float, held_out: float, follows: float = 1.0):
@@ -167,10 +171,13 @@ def test_reproduction_says_everything_once():
         missing=("ga: no finished run of seed 9",),
         yardstick={"epuck_planar": {"mean": 195.8}, "epuck": {"mean": 196.9}},
     )
-    text = reproduction(data, None, "python -m evolution.reproduce --quick")
-    assert text == reproduction(data, None, "python -m evolution.reproduce --quick")
+    text = reproduction(data, None, UNEVOLVED, "python -m evolution.reproduce --quick")
+    assert text == reproduction(
+        data, None, UNEVOLVED, "python -m evolution.reproduce --quick"
+    )
     assert "python -m evolution.reproduce --quick" in text
     assert "ga: no finished run of seed 9" in text
+    assert "| literal | 150 | 249.0 | 248.0 | circler 100% |" in text
     assert "| wall-follower, written by hand |  |  | 196.9 | 195.8 |  |" in text
     # the most believed is worth 100 less than the champion
     assert "| DE/best/1/bin | 5 | 247.0 [246.0, 248.0] | 145.0 [145.0, 145.0] |" in text
@@ -182,6 +189,17 @@ def test_reproduction_says_everything_once():
 
 def test_reproduction_of_a_single_run():
     data = study({"de-best": 200.0}, n=1, robots=("epuck",))
-    text = reproduction(data, data, "command")
+    text = reproduction(data, data, UNEVOLVED, "command")
     assert "can't be tested" in text
     assert "Evolved on wheels from the start" in text
+
+
+def test_the_printed_equation_leaves_nothing_to_evolve():
+    config = load_config(find_config("de-best"))
+    config = config.model_copy(update={"steps": 150})
+    found = {name: first_generation(config, name) for name in ("literal", "product")}
+    assert found["literal"].individuals == 150
+    assert found["literal"].best > 0.75 * 150
+    assert found["product"].best < 0.2 * 150
+    near_walls = ("wall follower", "hugger")
+    assert sum(found["literal"].behaviour[name] for name in near_walls) < 0.05

@@ -12,6 +12,7 @@ from evolution.report.blocks import (
     to_markdown,
 )
 from evolution.report.claims import Claim, claims, held_out_order, verdicts
+from evolution.report.first_generation import FirstGeneration
 from evolution.report.samples import kept, most_believed
 from evolution.report.tables import labels_of, shown_robots
 from evolution.report.words import spread
@@ -52,12 +53,18 @@ DIFFERENCES = (
 """What, in the paper, here."""
 
 
-def reproduction(study: StudyData, wheels: StudyData | None, made_by: str) -> str:
+def reproduction(
+    study: StudyData,
+    wheels: StudyData | None,
+    unevolved: Sequence[FirstGeneration],
+    made_by: str,
+) -> str:
     """The text of REPRODUCTION.md.
 
     Args:
         study: evolved on the plane.
         wheels: evolved on wheels from the start, if there is one.
+        unevolved: the first generation by each reading of the fitness equation.
         made_by: the command that wrote it.
     """
     found = claims(study)
@@ -100,7 +107,12 @@ def reproduction(study: StudyData, wheels: StudyData | None, made_by: str) -> st
             *_there(wheels),
             _claims(held_out_order(wheels, wheels.robots[-1])),
         ]
-    blocks += [Heading("What differs from the original"), _differences(study)]
+    blocks += [
+        Heading("Why equation (2) is not taken as printed"),
+        *_unevolved(unevolved, study.steps),
+        Heading("What differs from the original"),
+        _differences(study),
+    ]
     return to_markdown(blocks)
 
 
@@ -193,6 +205,35 @@ def _rungs(study: StudyData) -> list[Block]:
                 for name, share in shares.items()
             ]
         )
+    ]
+
+
+def _unevolved(found: Sequence[FirstGeneration], steps: int) -> list[Block]:
+    rows = [
+        [
+            each.fitness,
+            str(each.individuals),
+            f"{each.best:.1f}",
+            f"{each.held_out:.1f}",
+            ", ".join(
+                f"{name} {share:.0%}"
+                for name, share in sorted(each.behaviour.items(), key=lambda i: -i[1])
+                if share >= 0.01
+            ),
+        ]
+        for each in found
+    ]
+    return [
+        Paragraph(
+            "The best of a first generation, drawn at random, by the fitness as "
+            f"printed (literal) and by the prose (product), of {steps}, and what it "
+            "does. The paper's curves rise; by the printed equation there is next to "
+            "nothing left to evolve."
+        ),
+        Table(
+            ["fitness", "individuals", "best", "on fresh starts", "behaviour"],
+            rows,
+        ),
     ]
 
 
