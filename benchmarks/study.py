@@ -2,7 +2,8 @@
 
 Two figures: the share of a run's CPU time that is not spent on evaluating controllers,
 at the full budget, interpreter and imports included; and how much faster two runs are
-side by side, or with a thread per core, than on one core. The second needs a machine with two idle cores.
+side by side, or with a thread per core, than on one core. The second needs a machine
+with two idle cores.
 """
 
 import json
