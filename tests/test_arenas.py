@@ -1,0 +1,84 @@
+"""The shipped arenas: walls only, and room in all of them for any robot."""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from scipy import spatial
+
+from epuck_mj.clearance import ClearanceProbe
+from epuck_mj.control import TaskParameters
+from epuck_mj.model import MODELS, load_scene
+from epuck_mj.starts import FreeSpace
+from epuck_mj.tasks import START_CLEARANCE
+from epuck_mj.wall_follower import WallFollower
+from evolution.held_out import Judge
+
+ARENAS = sorted(MODELS.glob("arenas/*.xml"))
+ROBOTS = ("epuck_planar", "epuck")
+
+arenas = pytest.mark.parametrize("path", ARENAS, ids=lambda path: path.stem)
+
+
+def test_there_is_an_arena_of_each_kind():
+    assert {path.stem for path in ARENAS} == {
+        "small_square",
+        "large_square",
+        "rectangle",
+        "l_shape",
+        "round",
+        "octagon",
+        "corridor",
+        "pillars",
+        "convex_corner",
+    }
+
+
+@arenas
+def test_it_holds_walls_and_nothing_else(path: Path):
+    root = ET.parse(path).getroot()
+    assert root.get("model") == path.stem
+    assert [child.tag for child in root] == ["include", "include", "worldbody"]
+    assert {child.get("file") for child in root[:2]} == {"../epuck.xml", "../stage.xml"}
+    for element in root[2].iter():
+        assert element.tag in ("worldbody", "replicate", "geom")
+        assert element.tag != "geom" or element.get("class") == "wall"
+    assert len(path.read_text().splitlines()) < 20
+
+
+@arenas
+def test_mujoco_and_every_robot_load_it(path: Path):
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert model.opt.timestep == 0.01
+    for robot in ROBOTS:
+        scene = load_scene(robot, path.stem)
+        assert scene.arena == path
+        assert set(scene.sha256) == {"arena", "robot", "../stage.xml"}
+
+
+@arenas
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_starts_touch_nothing_and_reach_all_of_the_free_space(path: Path, robot: str):
+    scene = load_scene(robot, path.stem)
+    space = FreeSpace(scene, START_CLEARANCE)
+    starts = space.sample(np.random.default_rng(0), 2000)
+    assert ClearanceProbe(scene, 1).measure(starts).distance.min() > (
+        START_CLEARANCE - 1e-4
+    )
+    nodes = space.origin + space.spacing * np.argwhere(space.inside)
+    far, _ = spatial.KDTree(starts[:, :2]).query(nodes)
+    # 2,000 starts in two square metres lie a few centimetres apart
+    assert far.max() < 0.12
+
+
+@arenas
+def test_the_hand_written_follower_follows_its_walls(path: Path):
+    judge = Judge(
+        load_scene("epuck_planar", path.stem), TaskParameters(), START_CLEARANCE, 1
+    )
+    test = judge.test(WallFollower(), 20)
+    assert test.behaviour["wall follower"] + test.behaviour["hugger"] >= 0.75
+    assert test.metrics["laps"] is not None
+    assert test.metrics["laps"] > 0.3
