@@ -104,3 +104,16 @@ def command(module: str, *arguments: str | Path) -> str:
     else:
         python = Path("python")
     return shlex.join([str(python), "-m", module, *map(str, arguments)])
+
+
+def check_threads(threads: int) -> None:
+    """Nothing, if so many threads make sense; 0 stands for one per core.
+
+    Raises:
+        UserError: if not.
+    """
+    if not 0 <= threads <= THREADS_MAX:
+        raise UserError(f"expected threads from 0 to {THREADS_MAX}, got {threads}")
+
+
+THREADS_MAX = 1024

@@ -1,7 +1,7 @@
 """The control step and the trial: the same for one robot and for thousands."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from typing import Any, Protocol, Self
 
 import numpy as np
@@ -66,9 +66,15 @@ class TaskParameters:
             UserError: if the fields are others.
         """
         try:
-            return cls(**{**fields, "speeds": Speeds(**fields["speeds"])})
-        except (KeyError, TypeError) as error:
+            task = cls(**{**fields, "speeds": Speeds(**fields["speeds"])})
+            numbers = (task.control_step, task.sensor_range, *astuple(task.speeds))
+            if not (isinstance(task.steps, int) and task.steps > 0):
+                raise ValueError(f"expected steps above 0, got {task.steps!r}")
+            if not all(0 < number < float("inf") for number in numbers):
+                raise ValueError(f"expected numbers above 0, got {numbers}")
+        except (KeyError, TypeError, ValueError) as error:
             raise UserError(f"not the parameters of a task: {error}") from None
+        return task
 
     @property
     def step_fitness(self) -> StepFitness:

@@ -8,15 +8,17 @@ from pathlib import Path
 import tyro
 
 from epuck_mj import controller, files
-from epuck_mj.command_line import main, parse
+from epuck_mj.command_line import check_threads, main, parse
 from epuck_mj.control import Policy, TaskParameters
 from epuck_mj.errors import UserError
 from epuck_mj.model import load_scene
 from epuck_mj.tasks import START_CLEARANCE
 from epuck_mj.wall_follower import WallFollower
 from evolution.champion import N_TEST
+from evolution.config import load_config
 from evolution.held_out import HeldOut, Judge
-from evolution.results import WHEELED_ROBOT
+from evolution.results import PLANAR_ROBOT, WHEELED_ROBOT
+from evolution.run_directory import RunDirectory
 from evolution.study_data import YARDSTICK
 
 MODULE = "evolution.evaluate"
@@ -55,6 +57,7 @@ class Candidate:
     task: TaskParameters
     robot: str = "epuck_planar"
     arena: str = "arena"
+    start_clearance: float = START_CLEARANCE
 
 
 def evaluate(argv: Sequence[str]) -> int:
@@ -66,6 +69,7 @@ def evaluate(argv: Sequence[str]) -> int:
     options = parse(Options, f"python -m {MODULE}", argv)
     if not 2 <= options.starts <= STARTS_MAX:
         raise UserError(f"expected 2 to {STARTS_MAX} starts, got {options.starts}")
+    check_threads(options.threads)
     if not options.paths:
         raise UserError(
             f"expected run or study directories, controller files, or {YARDSTICK}"
@@ -74,14 +78,15 @@ def evaluate(argv: Sequence[str]) -> int:
     judges: dict[tuple, Judge] = {}
     tests = []
     for candidate in candidates:
-        robots = [options.robot] if options.robot else [candidate.robot, WHEELED_ROBOT]
+        other = PLANAR_ROBOT if candidate.robot == WHEELED_ROBOT else WHEELED_ROBOT
+        robots = [options.robot] if options.robot else [candidate.robot, other]
         arena = options.arena or candidate.arena
         for robot in dict.fromkeys(robots):
-            key = (robot, arena, candidate.task)
+            key = (robot, arena, candidate.task, candidate.start_clearance)
             if key not in judges:
                 scene = load_scene(robot, arena, candidate.task.control_step)
                 judges[key] = Judge(
-                    scene, candidate.task, START_CLEARANCE, options.threads
+                    scene, candidate.task, candidate.start_clearance, options.threads
                 )
             test = judges[key].test(candidate.policy, options.starts)
             print(f"{candidate.name}, {Path(robot).name} in {Path(arena).name}")
@@ -105,7 +110,7 @@ def _candidates(path: str) -> Iterator[Candidate]:
         return
     place = Path(path)
     champions = [place]
-    if place.is_dir():
+    if not files.is_file(place):
         # a run's own, or those of all the runs of a study
         champions = sorted(place.glob("champion.json")) or sorted(
             place.glob("*/seed-*/champion.json"),
@@ -124,7 +129,14 @@ def _candidates(path: str) -> Iterator[Candidate]:
             TaskParameters.from_dict(file.task),
             _scene(file.scene, "robot", champion),
             _scene(file.scene, "arena", champion),
+            _start_clearance(champion.parent) if place.is_dir() else START_CLEARANCE,
         )
+
+
+def _start_clearance(run: Path) -> float:
+    """The one that a run's champion was tested with; its file does not say."""
+    config = RunDirectory(run).config
+    return load_config(config).start_clearance if config.is_file() else START_CLEARANCE
 
 
 def _scene(fields: dict, key: str, path: Path) -> str:

@@ -19,20 +19,22 @@ from evolution.figures import fitness_figure, save_figure, trajectory_figure
 from evolution.held_out import HeldOut, Judge
 from evolution.run_directory import RunDirectory
 
-WHEELED_ROBOT = "epuck"
-"""Every champion is reported on this robot, whatever it was evolved on."""
+WHEELED_ROBOT, PLANAR_ROBOT = "epuck", "epuck_planar"
+"""Every champion is reported on the first, whatever it was evolved on, and what was
+evolved on it on the second as well."""
 
 N_SHOWN = 4
 """Trials of the champion in the picture; the first is also the recording."""
 
 
 def judges(config: ExperimentConfig, threads: int = 0) -> dict[str, Judge]:
-    """The robots that a champion is tested on: its own, and the one on wheels.
+    """The robots that a champion is tested on: its own, then the planar or wheeled one.
 
     Raises:
         UserError: if the wheeled robot cannot use the arena, or nobody can measure it.
     """
-    names = {Path(robot).name: robot for robot in (config.robot, WHEELED_ROBOT)}
+    other = PLANAR_ROBOT if config.robot == WHEELED_ROBOT else WHEELED_ROBOT
+    names = {Path(robot).name: robot for robot in (config.robot, other)}
     return {
         name: Judge(
             load_scene(robot, config.arena, config.control_step),

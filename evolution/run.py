@@ -10,7 +10,7 @@ from typing import Literal
 
 import tyro
 
-from epuck_mj.command_line import command, main, parse
+from epuck_mj.command_line import check_threads, command, main, parse
 from epuck_mj.errors import UserError
 from epuck_mj.model import absolute
 from evolution.config import (
@@ -26,7 +26,6 @@ from evolution.results import summary
 from evolution.run_directory import RunDirectory
 
 MODULE = "evolution.run"
-THREADS_MAX = 1024
 
 
 @dataclass(frozen=True)
@@ -67,10 +66,7 @@ def run(argv: Sequence[str]) -> int:
     if options.print_config:
         print(options.config.to_yaml(), end="")
         return 0
-    if not 0 <= options.threads <= THREADS_MAX:
-        raise UserError(
-            f"expected threads from 0 to {THREADS_MAX}, got {options.threads}"
-        )
+    check_threads(options.threads)
     if options.resume is not None:
         directory = RunDirectory(options.resume)
         directory.refuse_other_config(options.config)

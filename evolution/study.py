@@ -68,16 +68,19 @@ def study(argv: Sequence[str]) -> int:
         raise UserError(f"expected jobs from 0 to {JOBS_MAX}, got {options.jobs}")
     if options.split and options.cluster is None:
         raise UserError("expected --cluster with --split: what to send evaluations to")
+    if options.jobs and options.cluster is not None:
+        raise UserError("expected --jobs or --cluster, got both: workers do the jobs")
     seeds = parse_seeds(options.seeds)
     config = StudyConfig.load(find_study(options.study))
     if options.experiments is not None:
-        config = config.only(options.experiments.split(","))
+        names = [name.strip() for name in options.experiments.split(",")]
+        config = config.only(names)
     directory = StudyDirectory(options.output)
     directory.open(config)
+    typed = tuple(argv)
     # all experiments of a seed before the next: a study cut short is still paired
     everything = [
-        Job(name, config.with_seed(name, seed), directory.run(name, seed).path, argv)
-        for argv in [tuple(argv)]
+        Job(name, config.with_seed(name, seed), directory.run(name, seed).path, typed)
         for seed in seeds
         for name in config.experiments
     ]
@@ -154,9 +157,8 @@ def _shown(
 ) -> Iterator[Event]:
     """The same events; a bar for the study and a line for each run that ends."""
     budget = {job: job.config.evaluations for job in everything}
-    done = dict.fromkeys(everything, 0) | {
-        job: budget[job] for job in everything if job not in jobs
-    }
+    waiting = set(jobs)
+    done = {job: 0 if job in waiting else budget[job] for job in everything}
     finished = len(everything) - len(jobs)
     if finished:
         tqdm.write(f"{finished} of {len(everything)} runs were finished already")

@@ -1,13 +1,16 @@
 """What a study has found so far, read back from its directory."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from pydantic import BaseModel, Field, FiniteFloat, ValidationError
 
 from epuck_mj import controller
+from epuck_mj.control import TaskParameters
 from epuck_mj.controller import ControllerFile
 from epuck_mj.errors import UserError
 from evolution.config import ExperimentConfig, differing_keys
@@ -100,7 +103,8 @@ def load_study(path: Path) -> StudyData:
             missing.append(f"{name}: no finished run")
     everything = [run for each in runs.values() for run in each]
     if not everything:
-        raise UserError(f"no finished run in '{path}': {'; '.join(missing)}")
+        said = "; ".join([*missing[:3], "..."] if len(missing) > 3 else missing)
+        raise UserError(f"no finished run in '{path}': {said}")
     missing += _unpaired(runs)
     robots = {tuple(run.champion.scores["held_out"]) for run in everything}
     steps = {run.champion.task["steps"] for run in everything}
@@ -109,13 +113,19 @@ def load_study(path: Path) -> StudyData:
             f"expected runs on the same robots and as many steps in '{path}', got "
             f"robots {sorted(robots)} and steps {sorted(steps)}"
         )
+    tested = robots.pop()
+    yardstick: Mapping[str, Mapping] = {}
+    try:
+        yardstick = _yardstick(directory, tested)
+    except UserError as error:
+        missing.append(f"{YARDSTICK}: {error}")
     return StudyData(
         path=path,
         configs=config.experiments,
         runs=runs,
-        robots=robots.pop(),
+        robots=tested,
         steps=steps.pop(),
-        yardstick=_yardstick(directory),
+        yardstick=yardstick,
         missing=tuple(missing),
     )
 
@@ -133,10 +143,50 @@ def _run(directory: RunDirectory, config: ExperimentConfig, seed: int) -> RunDat
     if differing:
         raise UserError(f"of another config: {', '.join(differing)}")
     champion = controller.load(directory.champion)
-    tests = champion.scores.get("held_out")
-    if not tests or not all("mean" in test for test in tests.values()):
-        raise UserError(f"'{directory.champion}' has no held-out fitness")
+    check_scores(champion.scores, directory.champion)
+    TaskParameters.from_dict(champion.task)
     return RunData(seed, read_history(directory.history), champion, directory.path)
+
+
+class _Test(BaseModel):
+    """What reports read of a held-out evaluation."""
+
+    mean: FiniteFloat
+    standard_deviation: FiniteFloat | None = None
+    interval: tuple[float, float] | None = None
+    worst: FiniteFloat | None = None
+    crash_rate: FiniteFloat
+    starts: int = 0
+    behaviour: dict[str, FiniteFloat] | None = None
+    metrics: dict[str, FiniteFloat | None] | None = None
+
+
+class _Believed(BaseModel):
+    stored: FiniteFloat
+    held_out: FiniteFloat
+
+
+class _Yardstick(BaseModel):
+    held_out: dict[str, _Test] = Field(min_length=1)
+
+
+class _Scores(_Yardstick):
+    stored: FiniteFloat
+    most_believed: _Believed | None = None
+
+
+def check_scores(scores: Any, path: Path, kind: type[BaseModel] = _Scores) -> None:
+    """Nothing, if the scores in the file at `path` are all there and numbers.
+
+    Raises:
+        UserError: naming what is not.
+    """
+    try:
+        kind.model_validate(scores)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or "scores"
+        raise UserError(f"'{path}' is damaged: {where}: {first['msg']}") from None
 
 
 def read_history(path: Path) -> dict[str, np.ndarray]:
@@ -151,8 +201,9 @@ def read_history(path: Path) -> dict[str, np.ndarray]:
         if header != ",".join(HISTORY) or rows.ndim != 2 or not len(rows):
             raise ValueError(f"expected rows of {','.join(HISTORY)}")
         columns = dict(zip(HISTORY, rows.T, strict=True))
-        if (np.diff(columns["evaluations"]) <= 0).any() or np.isnan(rows).any():
-            raise ValueError("evaluations do not rise, or a value is missing")
+        spent = np.diff(columns["evaluations"], prepend=0)
+        if (spent <= 0).any() or not np.isfinite(rows).all():
+            raise ValueError("evaluations do not rise, or a value is not finite")
     except OSError as error:
         raise UserError(f"cannot read '{path}': {error.strerror}") from None
     except ValueError as error:
@@ -171,7 +222,7 @@ def _unpaired(runs: Mapping[str, tuple[RunData, ...]]) -> list[str]:
     ]
 
 
-def _yardstick(directory: StudyDirectory) -> dict[str, dict]:
+def _yardstick(directory: StudyDirectory, robots: Sequence[str]) -> dict[str, dict]:
     """Scores of the hand-written wall follower; empty if it was never tested.
 
     Raises:
@@ -182,6 +233,10 @@ def _yardstick(directory: StudyDirectory) -> dict[str, dict]:
         return {}
     try:
         fields = json.loads(path.read_text(encoding="utf-8"))
-        return dict(fields["held_out"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError) as error:
         raise UserError(f"cannot read '{path}': {error}") from None
+    check_scores(fields, path, _Yardstick)
+    missing = [robot for robot in robots if robot not in fields["held_out"]]
+    if missing:
+        raise UserError(f"'{path}' has no test on {missing[0]}")
+    return fields["held_out"]

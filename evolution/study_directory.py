@@ -27,7 +27,8 @@ class StudyDirectory:
         """Seeds of which there is a directory, in ascending order."""
         found = (path.name for path in (self.path / name).glob(f"{PREFIX}*/"))
         numbers = (part.removeprefix(PREFIX) for part in found)
-        return sorted(int(number) for number in numbers if number.isdigit())
+        # not seed-01, a copy that a person made: it would count as seed 1 again
+        return sorted(int(n) for n in numbers if n.isdecimal() and str(int(n)) == n)
 
     def open(self, config: StudyConfig) -> None:
         """Make the directory, or go on with it; more experiments may join.

@@ -13,12 +13,13 @@ from pathlib import Path
 import tyro
 
 from epuck_mj import controller
-from epuck_mj.command_line import main, parse
+from epuck_mj.command_line import check_threads, main, parse
 from epuck_mj.errors import UserError
 from epuck_mj.model import load_scene
 from evolution.held_out import Judge
 from evolution.provenance import processor
 from evolution.run_directory import RunDirectory
+from evolution.study_data import check_scores
 
 MODULE = "evolution.verify"
 
@@ -45,6 +46,7 @@ def verify(argv: Sequence[str]) -> int:
         UserError: for anything the user can put right.
     """
     options = parse(Options, f"python -m {MODULE}", argv)
+    check_threads(options.threads)
     runs = [run for path in options.paths for run in _runs(path)]
     if not runs:
         raise UserError("expected run or study directories")
@@ -71,8 +73,9 @@ def _runs(path: Path) -> list[RunDirectory]:
 def _verified(run: RunDirectory, threads: int) -> bool:
     """Whether the champion scores the same; says so, or what differs."""
     config, champion = run.stored_config(), controller.load(run.champion)
+    check_scores(champion.scores, run.champion)
     differing = []
-    for robot, written in champion.scores.get("held_out", {}).items():
+    for robot, written in champion.scores["held_out"].items():
         # its own robot may be a file
         named = config.robot if Path(config.robot).name == robot else robot
         scene = load_scene(named, config.arena, config.control_step)
@@ -84,8 +87,8 @@ def _verified(run: RunDirectory, threads: int) -> bool:
                 f"({again.mean - written['mean']:+.3g}, 95 % CI "
                 f"{again.interval[0]:.1f} to {again.interval[1]:.1f})"
             )
-        changed = written.get("mjcf_sha256", champion.scene.get("mjcf_sha256"))
-        if named == champion.scene.get("robot") and changed != dict(scene.sha256):
+        before = champion.scene.get("mjcf_sha256")
+        if named == champion.scene.get("robot") and before != dict(scene.sha256):
             differing.append(f"{robot}: its robot or arena has been edited since")
     if differing:
         causes = _changes(run.provenance_fields())

@@ -2,10 +2,12 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
+from epuck_mj.control import TaskParameters
 from epuck_mj.controller import ControllerFile, Network
 from evolution.config import find_config, load_config
 from evolution.study_config import StudyConfig
@@ -104,7 +106,9 @@ def _write_run(
         },
     }
     genome = rng.uniform(-5, 5, Network().n_genes)
-    champion = ControllerFile(Network(), genome, {"steps": STEPS}, {}, scores)
+    champion = ControllerFile(
+        Network(), genome, asdict(TaskParameters(steps=STEPS)), {}, scores
+    )
     run.champion.write_text(champion.to_json())
     provenance = {
         "argv": ["paper", "--seeds", "1-30", "--output", "runs/paper"],

@@ -100,7 +100,24 @@ def test_the_opposite_order_is_inconsistent():
     found = claims(study({"de-best": 100.0, "de-rand": 200.0, "ga": 250.0}))
     assert verdict(found, "DE/best", "beats", "DE/rand") == INCONSISTENT
     assert verdict(found, "DE/rand", "beats", "GA") == INCONSISTENT
+    # five runs do not say how far a sixth may lie
+    assert verdict(found, "246.66") == UNTESTED
+    found = claims(study({"de-best": 100.0}, n=20))
     assert verdict(found, "246.66") == INCONSISTENT
+
+
+def test_three_runs_decide_no_order():
+    found = claims(study(LIKE_THE_PAPER, n=3))
+    assert verdict(found, "DE/best", "beats", "GA") == UNTESTED
+    assert "p = 0.100" in found[0].ours
+
+
+def test_another_budget_or_task_tests_nothing():
+    data = study(LIKE_THE_PAPER)
+    config = data.configs["ga"].model_copy(update={"evaluations": 1500})
+    found = claims(replace(data, configs={**data.configs, "ga": config}))
+    assert {claim.verdict for claim in found} == {UNTESTED}
+    assert found[0].ours == "needs evaluations 30000, the study has 1500"
 
 
 def test_equal_algorithms_cannot_be_told_apart():
@@ -138,7 +155,9 @@ def test_quantities_by_hand():
     )
     # 90 % of a straight line is there after nine tenths
     np.testing.assert_allclose(maturity(data, "de-best"), [0.9, 0.9, 0.9])
-    assert verdict(claims(data), "DE/best", "mature") == INCONSISTENT
+    assert verdict(claims(data), "DE/best", "mature") == UNTESTED
+    late = study({"de-best": 200.0}, n=5)
+    assert verdict(claims(late), "DE/best", "mature") == INCONSISTENT
 
 
 def test_behaviour_is_judged_on_the_last_robot():

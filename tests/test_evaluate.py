@@ -83,7 +83,7 @@ def test_another_arena(finished, tmp_path, capsys):
     ("arguments", "message"),
     [
         ([], "expected run or study directories"),
-        (["nowhere"], "cannot read controller 'nowhere'"),
+        (["nowhere"], "no champion in 'nowhere'"),
         (["wall-follower", "--starts", "1"], "expected 2 to 100000 starts, got 1"),
         (["wall-follower", "--robot", "r2d2"], "r2d2"),
         (["."], "no champion in '.'"),

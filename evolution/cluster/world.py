@@ -11,7 +11,7 @@ from epuck_mj.model import load_scene
 from evolution.config import ExperimentConfig
 from evolution.results import WHEELED_ROBOT
 
-DECIDING = ("epuck-mj", "mujoco", "numpy", "cmaes")
+DECIDING = ("epuck-mj", "mujoco", "numpy", "scipy", "contourpy", "cmaes")
 """Packages whose version decides over the bits."""
 
 

@@ -1,19 +1,32 @@
 """The paper's claims held against a study: our number, its interval, n, a verdict.
 
-A claim is consistent or inconsistent only where the data say so: where an interval
-leaves both open, or there are fewer runs than the paper had, it cannot be tested.
+A claim is consistent or inconsistent only where the data say so. An order needs a
+Mann-Whitney p below 0.05, a statement about every run a Wilson interval on one side of
+one half, and a maximum enough runs that one of the paper's would hardly lie outside
+theirs. All else cannot be tested, nor can anything at another budget than the paper's.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evolution.comparisons import a12_interval
-from evolution.statistics import quartiles
+from evolution.comparisons import a12_interval, mann_whitney
+from evolution.results import WHEELED_ROBOT
+from evolution.statistics import quartiles, wilson
 from evolution.study_data import StudyData
 
 CONSISTENT, INCONSISTENT, UNTESTED = "consistent", "inconsistent", "can't be tested"
+
+LEVEL = 0.05
+"""Of the test of an order; claims are not adjusted for their number."""
+
+OUTSIDE_LEVEL = 0.1
+"""Chance of a run of ours outside the range of the others at which a maximum that is
+outside counts: 19 runs and more."""
+
+TASK = {"evaluations": 30_000, "steps": 300, "fitness": "product"}
+"""What the claims are about."""
 
 FEWEST = 3
 """Runs of each algorithm below which nothing is tested: the paper's own number."""
@@ -52,6 +65,9 @@ class Claim:
 
 def claims(study: StudyData) -> list[Claim]:
     """All claims of the paper, held against a study."""
+    unlike = _unlike(study)
+    if unlike:
+        study = replace(study, runs={})
     stored = _by_name(study, lambda name: best_stored(study, name))
     found = [
         _order(stored, better, worse, "in best (stored) fitness")
@@ -65,7 +81,16 @@ def claims(study: StudyData) -> list[Claim]:
     early = _by_name(study, lambda name: maturity(study, name))
     found += [_mature_early(early, name) for name in ("de-best", "de-rand")]
     found += [_follows(study, name) for name in ("de-best", "de-rand", "ga")]
-    return found
+    return [replace(claim, ours=unlike) for claim in found] if unlike else found
+
+
+def _unlike(study: StudyData) -> str:
+    """What makes the paper's three other experiments than its own; empty if nothing."""
+    for name, config in study.configs.items():
+        for key, expected in TASK.items():
+            if name in DISPLAY and (got := getattr(config, key)) != expected:
+                return f"needs {key} {expected}, the study has {got}"
+    return ""
 
 
 def held_out_order(study: StudyData, robot: str) -> list[Claim]:
@@ -115,12 +140,8 @@ def _order(
     n = f"{a.size} and {b.size}"
     if min(a.size, b.size) < FEWEST:
         return _too_few(text, n)
-    effect = a12_interval(a, b)
-    ours = (
-        f"medians {_median(a)} and {_median(b)}; A12 {effect.value:.2f} "
-        f"[{effect.low:.2f}, {effect.high:.2f}]"
-    )
-    return Claim(text, ours, n, _side(effect.low - 0.5, effect.high - 0.5))
+    ours, verdict = _compared(a, b)
+    return Claim(text, f"medians {_median(a)} and {_median(b)}; {ours}", n, verdict)
 
 
 def _maximum(stored: dict[str, np.ndarray], name: str) -> Claim:
@@ -129,10 +150,15 @@ def _maximum(stored: dict[str, np.ndarray], name: str) -> Claim:
     text = f"{DISPLAY[name]} reaches a maximum fitness of {paper}"
     if sample.size < FEWEST:
         return _too_few(text, str(sample.size))
-    low, high = sample.min(), sample.max()
-    ours = f"median {_median(sample)}, runs from {low:.1f} to {high:.1f}"
-    inside = low <= paper <= high
-    return Claim(text, ours, str(sample.size), CONSISTENT if inside else INCONSISTENT)
+    low, high, chance = sample.min(), sample.max(), 2 / (sample.size + 1)
+    ours = (
+        f"median {_median(sample)}, runs from {low:.1f} to {high:.1f}; another run "
+        f"like these is outside with a chance of {chance:.2f}"
+    )
+    verdict = INCONSISTENT if chance <= OUTSIDE_LEVEL else UNTESTED
+    if low <= paper <= high:
+        verdict = CONSISTENT
+    return Claim(text, ours, str(sample.size), verdict)
 
 
 def _approaches(gap: dict[str, np.ndarray], name: str) -> Claim:
@@ -142,12 +168,9 @@ def _approaches(gap: dict[str, np.ndarray], name: str) -> Claim:
     n = f"{a.size} and {b.size}"
     if min(a.size, b.size) < FEWEST:
         return _too_few(text, n)
-    effect = a12_interval(a, b)
-    ours = (
-        f"final mean / best {_percent(a)}, GA {_percent(b)}; A12 {effect.value:.2f} "
-        f"[{effect.low:.2f}, {effect.high:.2f}]"
-    )
-    return Claim(text, ours, n, _side(effect.low - 0.5, effect.high - 0.5))
+    ours, verdict = _compared(a, b)
+    ours = f"final mean / best {_percent(a)}, GA {_percent(b)}; {ours}"
+    return Claim(text, ours, n, verdict)
 
 
 def _stays_apart(gap: dict[str, np.ndarray]) -> Claim:
@@ -155,8 +178,8 @@ def _stays_apart(gap: dict[str, np.ndarray]) -> Claim:
     sample = gap["ga"]
     if sample.size < FEWEST:
         return _too_few(text, str(sample.size))
-    ours = f"final mean / best {_percent(sample)}"
-    verdict = _mostly(sample < 2 / 3)
+    ours, verdict = _mostly(sample < 2 / 3)
+    ours = f"final mean / best {_percent(sample)}; so in {ours}"
     return Claim(text, ours, str(sample.size), verdict)
 
 
@@ -168,13 +191,14 @@ def _mature_early(early: dict[str, np.ndarray], name: str) -> Claim:
     sample = early[name]
     if sample.size < FEWEST:
         return _too_few(text, str(sample.size))
-    ours = f"after {_percent(sample)} of the budget"
-    return Claim(text, ours, str(sample.size), _mostly(sample <= EARLY))
+    ours, verdict = _mostly(sample <= EARLY)
+    ours = f"after {_percent(sample)} of the budget; so in {ours}"
+    return Claim(text, ours, str(sample.size), verdict)
 
 
 def _follows(study: StudyData, name: str) -> Claim:
     """Finds a wall, follows it, does not crash: on wheels."""
-    robot = study.robots[-1]
+    robot = WHEELED_ROBOT
     text = (
         f"{DISPLAY[name]}'s best finds a wall and follows it without crashing (read "
         f"as: in {FOLLOWING:.0%} of its trials on {robot})"
@@ -184,8 +208,11 @@ def _follows(study: StudyData, name: str) -> Claim:
     if shares.size < FEWEST:
         return _too_few(text, str(shares.size))
     crashes = np.array([test["crash_rate"] for test in tests])
-    ours = f"in {_percent(shares)} of the trials; {_percent(crashes)} crash"
-    return Claim(text, ours, str(shares.size), _mostly(shares >= FOLLOWING))
+    ours, verdict = _mostly(shares >= FOLLOWING)
+    ours = (
+        f"in {_percent(shares)} of the trials, {_percent(crashes)} crash; so in {ours}"
+    )
+    return Claim(text, ours, str(shares.size), verdict)
 
 
 def following_share(test: dict) -> float:
@@ -194,19 +221,22 @@ def following_share(test: dict) -> float:
     return shares.get("wall follower", 0.0) + shares.get("hugger", 0.0)
 
 
-def _side(low: float, high: float) -> str:
-    """The verdict of an interval around a difference that should be positive."""
-    if low > 0:
-        return CONSISTENT
-    return INCONSISTENT if high < 0 else UNTESTED
+def _compared(a: np.ndarray, b: np.ndarray) -> tuple[str, str]:
+    """How far the runs of `a` exceed those of `b`, and the verdict on that."""
+    effect, p = a12_interval(a, b), mann_whitney(a, b).p
+    ours = f"A12 {effect.value:.2f} [{effect.low:.2f}, {effect.high:.2f}], p = {p:.3f}"
+    if p >= LEVEL:
+        return ours, UNTESTED
+    return ours, CONSISTENT if effect.value > 0.5 else INCONSISTENT
 
 
-def _mostly(holds: np.ndarray) -> str:
-    """Consistent if it holds in three of four runs, inconsistent in at most one."""
-    share = holds.mean()
-    if share >= 0.75:
-        return CONSISTENT
-    return INCONSISTENT if share <= 0.25 else UNTESTED
+def _mostly(holds: np.ndarray) -> tuple[str, str]:
+    """In how many runs something holds, and whether that is most of all there are."""
+    share = wilson(int(holds.sum()), holds.size)
+    ours = f"{holds.sum()} of {holds.size} runs [{share.low:.0%}, {share.high:.0%}]"
+    if share.low > 0.5:
+        return ours, CONSISTENT
+    return ours, INCONSISTENT if share.high < 0.5 else UNTESTED
 
 
 def _too_few(text: str, n: str) -> Claim:

@@ -4,6 +4,7 @@ import csv
 import io
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -194,8 +195,10 @@ def provenance(data: StudyData) -> dict[str, list[Any]]:
                 continue
             for part in (fields, *fields.get("resumed", ())):
                 for key, read in PROVENANCE.items():
-                    if part.get(key):
-                        found[key].add(read(part[key]))
+                    # what somebody has edited is left out
+                    with suppress(AttributeError, KeyError, TypeError):
+                        if part.get(key):
+                            found[key].add(read(part[key]))
     return {key: sorted(values) for key, values in found.items()}
 
 

@@ -1,0 +1,98 @@
+"""What a study has found, read back: damage is named, and never a traceback."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from epuck_mj.errors import UserError
+from evolution.report.tables import provenance
+from evolution.study_data import load_study, read_history
+from tests.study_on_disk import write_study
+
+
+@pytest.fixture
+def path(tmp_path) -> Path:
+    return write_study(tmp_path / "study", {"de-best": [1, 2], "ga": [1, 2]})
+
+
+def edit(file: Path, change: Callable[[dict], object]) -> None:
+    fields = json.loads(file.read_text())
+    change(fields)
+    file.write_text(json.dumps(fields))
+
+
+DAMAGE: dict[str, Callable[[dict], object]] = {
+    "stored null": lambda f: f["scores"].update(stored=None),
+    "held_out a list": lambda f: f["scores"].update(held_out=[1]),
+    "held_out empty": lambda f: f["scores"].update(held_out={}),
+    "test a number": lambda f: f["scores"]["held_out"].update(epuck=3),
+    "mean NaN": lambda f: f["scores"]["held_out"]["epuck"].update(mean=float("nan")),
+    "behaviour a list": lambda f: f["scores"]["held_out"]["epuck"].update(behaviour=[]),
+    "interval of three": lambda f: f["scores"]["held_out"]["epuck"].update(
+        interval=[1, 2, 3]
+    ),
+    "most_believed empty": lambda f: f["scores"].update(most_believed={}),
+    "task empty": lambda f: f.update(task={}),
+    "steps a text": lambda f: f["task"].update(steps="300"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_a_damaged_champion_is_missing_and_the_others_are_there(path, damage):
+    edit(path / "ga" / "seed-2" / "champion.json", DAMAGE[damage])
+    study = load_study(path)
+    assert [run.seed for run in study.runs["ga"]] == [1]
+    assert [run.seed for run in study.runs["de-best"]] == [1, 2]
+    (line,) = [line for line in study.missing if line.startswith("ga seed 2: ")]
+    assert "\n" not in line
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["{", '{"held_out": {}}', '{"held_out": {"epuck": {}}}', '{"held_out": 3}', "[]"],
+)
+def test_a_damaged_yardstick_is_missing_and_the_runs_are_there(path, text):
+    (path / "wall-follower.json").write_text(text)
+    study = load_study(path)
+    assert study.yardstick == {}
+    assert any(line.startswith("wall-follower: ") for line in study.missing)
+    assert len(study.runs["ga"]) == 2
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"git": "text"}, {"versions": [1]}, {"processor": 3}, {"argv": [1]}],
+    ids=str,
+)
+def test_edited_provenance_is_left_out(path, change):
+    file = path / "ga" / "seed-1" / "provenance.json"
+    edit(file, lambda fields: fields.update(change))
+    assert provenance(load_study(path))["git"]
+
+
+@pytest.mark.parametrize("row", ["2,0,1.0,1.0,1.0", "2,450,inf,1.0,1.0", "2,450,1.0"])
+def test_a_damaged_history_is_named(path, row):
+    file = path / "ga" / "seed-1" / "history.csv"
+    file.write_text(file.read_text() + row + "\n")
+    with pytest.raises(UserError, match="is damaged"):
+        read_history(file)
+
+
+def test_a_copied_run_does_not_count_twice(path):
+    run = path / "ga" / "seed-1"
+    for name in ("seed-01", "seed-²", "seed-"):
+        (path / "ga" / name).mkdir()
+        for file in run.iterdir():
+            (path / "ga" / name / file.name).write_bytes(file.read_bytes())
+    assert [run.seed for run in load_study(path).runs["ga"]] == [1, 2]
+
+
+def test_nothing_finished_is_said_in_few_words(tmp_path):
+    path = write_study(tmp_path / "study", {"ga": list(range(1, 13))})
+    for champion in path.glob("*/*/champion.json"):
+        champion.unlink()
+    with pytest.raises(UserError, match="no finished run") as error:
+        load_study(path)
+    assert len(str(error.value)) < 1000
