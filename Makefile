@@ -4,7 +4,7 @@ BIN := .venv/bin
 INSTALLED := .venv/.installed
 RUN := runs/de-best-seed-1
 
-.PHONY: run test bench convergence racing results figures clean
+.PHONY: run test bench convergence racing overhead results figures clean
 
 run: $(INSTALLED)
 	@if [ -f $(RUN)/config.yaml ]; then \
@@ -27,6 +27,9 @@ convergence: $(INSTALLED)
 
 racing: $(INSTALLED)
 	$(BIN)/python -m benchmarks.racing --threads 1 --json results/racing.json
+
+overhead: $(INSTALLED)
+	$(BIN)/python -m benchmarks.study --json results/study.json
 
 # what git keeps of the studies in runs/, and everything that is made of it
 results: $(INSTALLED)

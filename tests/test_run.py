@@ -428,11 +428,12 @@ def test_a_run_on_an_own_robot_of_another_name(here, quick, capsys):
     assert (here / "out" / "history.csv").read_bytes() == history
 
 
-def test_the_wheeled_robot_is_reported_once(here, quick, capsys):
+def test_the_wheeled_robot_is_tested_on_the_plane_as_well(here, quick, capsys):
     assert run(["ga", *SHORT, "--robot", "epuck", "--output", "out"]) == 0
     out = capsys.readouterr().out
     assert out.count("Held-out fitness") == 1
-    assert list(controller.load("out/champion.json").scores["held_out"]) == ["epuck"]
+    tests = controller.load("out/champion.json").scores["held_out"]
+    assert list(tests) == ["epuck", "epuck_planar"]
 
 
 def test_the_engine_changes_nothing(here, quick):
