@@ -291,7 +291,9 @@ def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
     )
 
 
-def test_a_run_on_the_wheeled_robot_is_tested_on_the_plane_as_well(tmp_path, monkeypatch):
+def test_a_run_on_the_wheeled_robot_is_tested_on_the_plane_as_well(
+    tmp_path, monkeypatch
+):
     monkeypatch.setattr(results, "_draw_fitness", lambda *_: None)
     monkeypatch.setattr(results, "_show", lambda *_: None)
     experiment = Experiment(tiny("ga", robot="epuck", steps=10, evaluations=20))
