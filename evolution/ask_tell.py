@@ -162,3 +162,55 @@ def checked_state(
                 f"got {got.dtype} {got.shape}"
             )
     return arrays
+
+
+def refuse_wide_steps(sigma: float, space: SearchSpace) -> None:
+    """Nothing, unless steps are wider than the bounds.
+
+    Raises:
+        ValueError: `sigma` exceeds their width.
+    """
+    width = space.upper - space.lower
+    if sigma > width:
+        raise ValueError(
+            f"sigma: expected at most {width}, the width of the bounds, got {sigma}"
+        )
+
+
+class Survivors:
+    """What optimisers share whose population are genomes with their stored fitness.
+
+    The attributes are those of `Optimizer`.
+    """
+
+    def __init__(self, name: str, population: np.ndarray, rng: Generator) -> None:
+        """Begin with genomes `(population, genes)` that have not been evaluated."""
+        self._rng = rng
+        self._asked: np.ndarray | None = None
+        self.name = name
+        self.population = read_only(population)
+        self.fitness = read_only(np.full(len(population), -np.inf))
+        self.generation = 0
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything the next generations depend on; see `Optimizer.state`."""
+        refuse_pending(self._asked, "take the state")
+        return self._arrays()
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Go on where `state` was taken; see `Optimizer.restore`."""
+        arrays = checked_state(state, like=self._arrays())
+        self._rng = restored_generator(self._rng, arrays["generator"])
+        self.population = read_only(arrays["population"])
+        self.fitness = read_only(arrays["fitness"])
+        self.generation = int(arrays["generation"])
+        self._asked = None
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return {
+            "name": np.array(self.name),
+            "generation": np.array(self.generation),
+            "population": self.population.copy(),
+            "fitness": self.fitness.copy(),
+            "generator": generator_state(self._rng),
+        }

@@ -31,6 +31,7 @@ from evolution.ask_tell import (
     pending,
     read_only,
     refuse_pending,
+    refuse_wide_steps,
     restored_generator,
 )
 
@@ -99,12 +100,7 @@ class CmaEs:
         Raises:
             ValueError: steps wider than the bounds.
         """
-        width = space.upper - space.lower
-        if parameters.sigma > width:
-            raise ValueError(
-                f"sigma: expected at most {width}, the width of the bounds, "
-                f"got {parameters.sigma}"
-            )
+        refuse_wide_steps(parameters.sigma, space)
         self._parameters = parameters
         self._space = space
         self._rng = rng

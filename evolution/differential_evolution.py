@@ -21,13 +21,11 @@ from numpy.typing import ArrayLike
 
 from evolution.ask_tell import (
     SearchSpace,
+    Survivors,
     checked_fitness,
-    checked_state,
-    generator_state,
     pending,
     read_only,
     refuse_pending,
-    restored_generator,
 )
 from evolution.bounds import BOUNDS_RULES
 
@@ -140,7 +138,7 @@ class DifferentialEvolutionParameters:
             )
 
 
-class DifferentialEvolution:
+class DifferentialEvolution(Survivors):
     """An `Optimizer`, 'de-best' or 'de-rand', whose attributes are documented there.
 
     Its population are the survivors. Without `reevaluate_parents` their stored fitness
@@ -154,17 +152,11 @@ class DifferentialEvolution:
         rng: Generator,
     ) -> None:
         """Draw the initial population; `rng` belongs to the optimiser from here on."""
+        shape = (parameters.population, space.genes)
+        population = rng.uniform(space.init_lower, space.init_upper, size=shape)
+        super().__init__(f"de-{parameters.strategy}", population, rng)
         self._parameters = parameters
         self._space = space
-        self._rng = rng
-        self._asked: np.ndarray | None = None
-        shape = (parameters.population, space.genes)
-        self.name = f"de-{parameters.strategy}"
-        self.population = read_only(
-            rng.uniform(space.init_lower, space.init_upper, size=shape)
-        )
-        self.fitness = read_only(np.full(parameters.population, -np.inf))
-        self.generation = 0
 
     def next_size(self) -> int:
         """Number of genomes the next ask returns."""
@@ -230,29 +222,6 @@ class DifferentialEvolution:
             self.fitness = read_only(np.where(accepted, trial_fitness, parent_fitness))
         self.generation += 1
         self._asked = None
-
-    def state(self) -> dict[str, np.ndarray]:
-        """Everything the next generations depend on; see `Optimizer.state`."""
-        refuse_pending(self._asked, "take the state")
-        return self._arrays()
-
-    def restore(self, state: Mapping[str, np.ndarray]) -> None:
-        """Go on where `state` was taken; see `Optimizer.restore`."""
-        arrays = checked_state(state, like=self._arrays())
-        self._rng = restored_generator(self._rng, arrays["generator"])
-        self.population = read_only(arrays["population"])
-        self.fitness = read_only(arrays["fitness"])
-        self.generation = int(arrays["generation"])
-        self._asked = None
-
-    def _arrays(self) -> dict[str, np.ndarray]:
-        return {
-            "name": np.array(self.name),
-            "generation": np.array(self.generation),
-            "population": self.population.copy(),
-            "fitness": self.fitness.copy(),
-            "generator": generator_state(self._rng),
-        }
 
     def _trials(self) -> np.ndarray:
         """One trial for each individual `(population, genes)`."""

@@ -24,13 +24,12 @@ from numpy.typing import ArrayLike
 
 from evolution.ask_tell import (
     SearchSpace,
+    Survivors,
     checked_fitness,
-    checked_state,
-    generator_state,
     pending,
     read_only,
     refuse_pending,
-    restored_generator,
+    refuse_wide_steps,
 )
 from evolution.bounds import BOUNDS_RULES
 
@@ -92,7 +91,7 @@ class EvolutionStrategyParameters:
             )
 
 
-class EvolutionStrategy:
+class EvolutionStrategy(Survivors):
     """An `Optimizer`, 'one-plus-one-es', whose attributes are documented there.
 
     Its population are the parents. Their stored fitness is for ever the one that let
@@ -110,24 +109,13 @@ class EvolutionStrategy:
         Raises:
             ValueError: steps wider than the bounds.
         """
-        width = space.upper - space.lower
-        if parameters.sigma > width:
-            raise ValueError(
-                f"sigma: expected at most {width}, the width of the bounds, "
-                f"got {parameters.sigma}"
-            )
+        refuse_wide_steps(parameters.sigma, space)
+        shape = (parameters.lineages, space.genes)
+        population = rng.uniform(space.init_lower, space.init_upper, size=shape)
+        super().__init__("one-plus-one-es", population, rng)
         self._parameters = parameters
         self._space = space
-        self._rng = rng
-        self._asked: np.ndarray | None = None
         self._sigma = np.full(parameters.lineages, parameters.sigma, dtype=np.float64)
-        shape = (parameters.lineages, space.genes)
-        self.name = "one-plus-one-es"
-        self.population = read_only(
-            rng.uniform(space.init_lower, space.init_upper, size=shape)
-        )
-        self.fitness = read_only(np.full(parameters.lineages, -np.inf))
-        self.generation = 0
 
     def next_size(self) -> int:
         """Number of genomes the next ask returns."""
@@ -180,30 +168,13 @@ class EvolutionStrategy:
         self.generation += 1
         self._asked = None
 
-    def state(self) -> dict[str, np.ndarray]:
-        """Everything the next generations depend on; see `Optimizer.state`."""
-        refuse_pending(self._asked, "take the state")
-        return self._arrays()
-
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Go on where `state` was taken; see `Optimizer.restore`."""
-        arrays = checked_state(state, like=self._arrays())
-        self._rng = restored_generator(self._rng, arrays["generator"])
-        self._sigma = arrays["sigma"]
-        self.population = read_only(arrays["population"])
-        self.fitness = read_only(arrays["fitness"])
-        self.generation = int(arrays["generation"])
-        self._asked = None
+        super().restore(state)
+        self._sigma = np.array(state["sigma"])
 
     def _arrays(self) -> dict[str, np.ndarray]:
-        return {
-            "name": np.array(self.name),
-            "generation": np.array(self.generation),
-            "population": self.population.copy(),
-            "fitness": self.fitness.copy(),
-            "sigma": self._sigma.copy(),
-            "generator": generator_state(self._rng),
-        }
+        return {**super()._arrays(), "sigma": self._sigma.copy()}
 
     def _offspring(self) -> np.ndarray:
         """One offspring of each parent `(lineages, genes)`."""

@@ -5,7 +5,6 @@ best individuals seen so far are kept. Randomness is drawn in this order: each
 generation's genomes, the first when the optimiser is made.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -15,13 +14,11 @@ from numpy.typing import ArrayLike
 
 from evolution.ask_tell import (
     SearchSpace,
+    Survivors,
     checked_fitness,
-    checked_state,
-    generator_state,
     pending,
     read_only,
     refuse_pending,
-    restored_generator,
 )
 
 
@@ -59,7 +56,7 @@ class RandomSearchParameters:
             raise ValueError(f"population: expected at least 1, got {self.population}")
 
 
-class RandomSearch:
+class RandomSearch(Survivors):
     """An `Optimizer`, 'random-search', whose attributes are documented there.
 
     Its population are the best individuals seen so far, the oldest first.
@@ -74,12 +71,7 @@ class RandomSearch:
         """Draw the first genomes; `rng` belongs to the optimiser from here on."""
         self._parameters = parameters
         self._space = space
-        self._rng = rng
-        self._asked: np.ndarray | None = None
-        self.name = "random-search"
-        self.population = read_only(self._drawn())
-        self.fitness = read_only(np.full(parameters.population, -np.inf))
-        self.generation = 0
+        super().__init__("random-search", self._drawn(rng), rng)
 
     def next_size(self) -> int:
         """Number of genomes the next ask returns."""
@@ -92,7 +84,9 @@ class RandomSearch:
             AskTellError: the last genomes have not been told.
         """
         refuse_pending(self._asked, "ask")
-        self._asked = self.population if self.generation == 0 else self._drawn()
+        self._asked = (
+            self.population if self.generation == 0 else self._drawn(self._rng)
+        )
         return self._asked.copy()
 
     def to_beat(self) -> np.ndarray:
@@ -126,31 +120,8 @@ class RandomSearch:
         self.generation += 1
         self._asked = None
 
-    def state(self) -> dict[str, np.ndarray]:
-        """Everything the next generations depend on; see `Optimizer.state`."""
-        refuse_pending(self._asked, "take the state")
-        return self._arrays()
-
-    def restore(self, state: Mapping[str, np.ndarray]) -> None:
-        """Go on where `state` was taken; see `Optimizer.restore`."""
-        arrays = checked_state(state, like=self._arrays())
-        self._rng = restored_generator(self._rng, arrays["generator"])
-        self.population = read_only(arrays["population"])
-        self.fitness = read_only(arrays["fitness"])
-        self.generation = int(arrays["generation"])
-        self._asked = None
-
-    def _arrays(self) -> dict[str, np.ndarray]:
-        return {
-            "name": np.array(self.name),
-            "generation": np.array(self.generation),
-            "population": self.population.copy(),
-            "fitness": self.fitness.copy(),
-            "generator": generator_state(self._rng),
-        }
-
-    def _drawn(self) -> np.ndarray:
+    def _drawn(self, rng: Generator) -> np.ndarray:
         """Genomes `(population, genes)`, uniform in the initial range."""
         space = self._space
         shape = (self._parameters.population, space.genes)
-        return self._rng.uniform(space.init_lower, space.init_upper, size=shape)
+        return rng.uniform(space.init_lower, space.init_upper, size=shape)
