@@ -6,7 +6,11 @@ Sources (each consulted for facts only):
 - WEBOTS: `E-puck.proto` of cyberbotics/webots.
 - FARSA: `phyepuck.cpp` of the FARSA simulator.
 - PLAYER: `epuckIR.cpp` of playerproject/player, the software the paper used.
-- FIRMWARE: `e_motors.c`, `e_epuck_ports.h` of gctronic/e-puck-library.
+- JBOTEVOLVER: `EpuckIRSensor.java` of BioMachinesLab/jbotevolver.
+- FIRMWARE: gctronic/e-puck-library: `e_motors.c`, `e_agenda.c`, `e_epuck_ports.h`,
+  `e_prox.c`, `e_ad_conv.h`, `e_uart1_rx_char.s`, `Asercom.c`, `BTcom.c`.
+- FIRMWARE2: the e-puck2's main processor, e-puck2/e-puck2_main-processor.
+- WIFI2: the e-puck2's radio, `socket_e-puck2.c` and `uart_e-puck2.c` of GCtronic.
 - PAPER: the wall-following study that this project replicates.
 """
 
@@ -94,3 +98,133 @@ PROXIMITY_HEIGHT = 0.033
 
 PROXIMITY_RANGE = 0.04
 """Range of the proximity sensors [m]. PAPER."""
+
+PROXIMITY_COUNTS = {
+    0.0: 3817.0,
+    0.005: 3294.0,
+    0.01: 1741.0,
+    0.015: 898.0,
+    0.02: 556.0,
+    0.03: 215.0,
+    0.04: 107.0,
+    0.05: 60.0,
+    0.06: 40.0,
+    0.07: 26.0,
+    0.08: 19.0,
+    0.10: 11.0,
+    0.12: 9.0,
+}
+"""Counts of a proximity sensor by distance [m] to a flat wall, ambient light taken off.
+
+Mean of eight sensors of two real robots. JBOTEVOLVER.
+"""
+
+PROXIMITY_COUNT_NOISE = {
+    0.0: 1.1,
+    0.005: 37.0,
+    0.01: 21.0,
+    0.015: 8.0,
+    0.02: 5.0,
+    0.03: 3.5,
+    0.04: 2.9,
+    0.05: 2.3,
+    0.06: 2.0,
+    0.07: 1.8,
+    0.08: 2.0,
+    0.10: 1.8,
+}
+"""Standard deviation in time of those counts, by distance [m]. JBOTEVOLVER."""
+
+PROXIMITY_COUNT_MAX = 4095
+"""Highest count of a proximity or ambient light sensor: 12 bits. FIRMWARE."""
+
+PROXIMITY_PERIOD = 0.0159
+"""Time in which all proximity sensors are read anew [s]. FIRMWARE."""
+
+PROXIMITY_PERIOD_2 = 0.010
+"""The same of the e-puck2 [s]. FIRMWARE2."""
+
+CALIBRATION_SAMPLES = 100
+"""Samples of a sensor whose mean is its offset from then on. FIRMWARE."""
+
+CALIBRATION_TIME_MAX = 3.0
+"""A calibration that takes longer than this has failed [s].
+
+Estimated from the code (1 to 3 s); 100 samples alone take 1.6 s. FIRMWARE.
+"""
+
+MOTOR_TICK_RATE = 10_000
+"""Ticks by which the motors' step periods are counted [1/s]. FIRMWARE."""
+
+MOTOR_TICK_RATE_2 = 50_000
+"""The same of the e-puck2: a timer of 100 kHz making half-steps [1/s]. FIRMWARE2."""
+
+COIL_TICKS = 15
+"""Ticks for which a slow motor's coil is on at each step: 1.5 ms. FIRMWARE."""
+
+COIL_ALWAYS_ON = 601
+"""From this speed on the coils are never switched off [steps/s]. FIRMWARE."""
+
+STEP_RATE_MAX_2 = 1100
+"""Highest wheel speed of the e-puck2's main processor [steps/s]. FIRMWARE2.
+
+Its radio accepts STEP_RATE_MAX. WIFI2.
+"""
+
+N_LEDS = 8
+"""Number of red LEDs on the ring. FIRMWARE."""
+
+N_SELECTOR = 16
+"""Positions of the selector. FIRMWARE."""
+
+BATTERY_LOW = 3.4
+"""Below this voltage the battery is reported as low [V]. FIRMWARE."""
+
+BAUD_RATE = 115_200
+"""Of the robot's UART, 8 data bits, no parity, one stop bit [bit/s]. FIRMWARE."""
+
+BYTE_TIME = 10 / BAUD_RATE
+"""Time that one byte takes on the UART, start and stop bit included [s]."""
+
+RECEIVE_RING = 64
+"""Bytes the UART can keep for a firmware that is busy. FIRMWARE."""
+
+REPLY_TIME_MAX = 0.3
+"""A reply that takes longer than this over Bluetooth is lost [s].
+
+Never measured in public: chosen. Drivers wait for 0.1 to 1 s; comparable robots need
+60 ms a transaction, and occasionally several 100 ms.
+"""
+
+OPERANDS_MAX = 19
+"""Most operand bytes a binary command waits for. FIRMWARE2 (all actuators)."""
+
+RESYNC_QUIET = 0.05
+"""Silence after which nothing more of an abandoned reply will come [s].
+
+Inferred, not measured. FIRMWARE.
+"""
+
+WIFI_PORT = 1000
+"""TCP port of the e-puck2. WIFI2."""
+
+WIFI_PERIOD = 0.010
+"""Time between two packets of the e-puck2 over TCP [s]. WIFI2."""
+
+WIFI_QUEUE = 5
+"""Commands that may wait in the e-puck2's radio; further ones are dropped. WIFI2."""
+
+READING_AGE_MAX = 0.3
+"""A bridge whose latest reading is older than this stops its robot [s]. Chosen."""
+
+CONNECT_TIME_MAX = 5.0
+"""A robot that has not answered for this long is none, or is gone [s].
+
+Chosen: longer than an e-puck takes to calibrate itself as it starts.
+"""
+
+STOP_TIME_MAX = 5.0
+"""For so long a robot that does not say that it stopped is told again [s]. Chosen."""
+
+STOP_REPLY_TIME = 0.2
+"""After this time without a word it is told to stop again [s]. Chosen."""

@@ -1,0 +1,52 @@
+"""What goes wrong between a host and its robot."""
+
+from epuck_mj.errors import UserError
+
+
+class BridgeError(UserError):
+    """Not what was expected of the robot, or of what it is told.
+
+    Attributes:
+        expected: what should have come.
+        came: what came instead.
+    """
+
+    def __init__(self, expected: str, came: str | bytes) -> None:
+        """From what was expected and what came; long bytes are shortened."""
+        super().__init__(expected, came)
+        self.expected = expected
+        self.came = came if isinstance(came, str) else _shown(came)
+
+    def __str__(self) -> str:
+        """One line."""
+        return f"expected {self.expected}; came {self.came}"
+
+
+class RobotRestarted(BridgeError):
+    """The robot greets as it does after a reset, which nobody asked for.
+
+    Its motors stand still, its step counters are zero, its calibration is lost.
+    """
+
+
+class NoReply(BridgeError):
+    """Nothing, or not enough, came in time."""
+
+
+class LinkLost(BridgeError):
+    """The port is gone: nobody hears us any more."""
+
+
+class StaleReading(BridgeError):
+    """Nobody knows what the robot senses now: it must not go on."""
+
+
+class StillMoving(BridgeError):
+    """The robot never said that it stopped."""
+
+
+def _shown(came: bytes, limit: int = 60) -> str:
+    """Bytes as a person reads them, the first `limit` of them."""
+    if len(came) <= limit:
+        return repr(came)
+    return f"{came[:limit]!r} and {len(came) - limit} bytes more"
