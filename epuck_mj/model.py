@@ -108,13 +108,10 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
     Raises:
         UserError: if a file is missing or broken, or a part of the robot is.
     """
-    robots = [MODELS / name for name in SHIPPED_ROBOTS]
-    robot_path = _find(robot, "robot", robots)
-    arenas = [MODELS / "arena.xml", *sorted(MODELS.glob("arenas/*.xml"))]
-    arena_path = _find(arena, "arena", arenas)
+    robot_path, arena_path = find_robot(robot), find_arena(arena)
     # compiled alone first: errors in an included file have no line number
     _compile(mujoco.MjSpec.from_file, str(robot_path), source=robot_path)
-    text, files = _with_robot(arena_path, robot_path)
+    text, files = with_robot(arena_path, robot_path)
     robot_text = _read(robot_path).encode()
     texts = {"arena": text.encode(), "robot": robot_text}
     texts |= {name: file for name, file in files.items() if file != robot_text}
@@ -134,6 +131,25 @@ def absolute(name: str) -> str:
     return name if name in shipped or not is_file(path) else str(path.resolve())
 
 
+def find_robot(name: str) -> Path:
+    """The file of a shipped robot, or the user's own.
+
+    Raises:
+        UserError: if there is none.
+    """
+    return _find(name, "robot", [MODELS / robot for robot in SHIPPED_ROBOTS])
+
+
+def find_arena(name: str) -> Path:
+    """The file of a shipped arena, or the user's own.
+
+    Raises:
+        UserError: if there is none.
+    """
+    arenas = [MODELS / "arena.xml", *sorted(MODELS.glob("arenas/*.xml"))]
+    return _find(name, "arena", arenas)
+
+
 def _find(name: str, kind: str, shipped: list[Path]) -> Path:
     """The file of a shipped model, or the user's own."""
     by_name = {path.stem: path for path in shipped}
@@ -146,8 +162,12 @@ def _find(name: str, kind: str, shipped: list[Path]) -> Path:
     )
 
 
-def _with_robot(arena: Path, robot: Path) -> tuple[str, dict[str, bytes]]:
-    """The arena's text and the files it includes, the robot among them replaced."""
+def with_robot(arena: Path, robot: Path) -> tuple[str, dict[str, bytes]]:
+    """The arena's text and the files it includes, the robot among them replaced.
+
+    Raises:
+        UserError: if a file is missing or no XML, or the arena is a robot itself.
+    """
     text = _read(arena)
     files, found = {}, False
     for name in _includes(text, arena):

@@ -5,6 +5,7 @@ that the robot could not be pushed from there to the outside of the walls.
 """
 
 import copy
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -28,6 +29,73 @@ BLOCKS_MAX = 1000
 """Blocks drawn before giving up."""
 
 
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Where a robot fits, on the nodes of a grid over the arena.
+
+    Attributes:
+        lower: corner of the box around the walls, `(2,)` [m].
+        upper: its other corner, `(2,)` [m].
+        origin: of the grid, one shell's width outside of that box, `(2,)` [m].
+        spacing: between nodes [m].
+        free: which nodes are far enough from everything, outside included, `(x, y)`.
+        inside: which of them are enclosed by walls, `(x, y)`.
+    """
+
+    lower: np.ndarray
+    upper: np.ndarray
+    origin: np.ndarray
+    spacing: float
+    free: np.ndarray
+    inside: np.ndarray
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Where the nodes are, `(x, y, 2)` [m]."""
+        return self.origin + self.spacing * np.moveaxis(
+            np.indices(self.free.shape), 0, -1
+        )
+
+
+def survey(scene: Scene, clearance: float) -> Grid:
+    """Where a robot fits, whether or not it may start there.
+
+    Args:
+        scene: robot and arena.
+        clearance: least distance from the shell to anything it can hit [m].
+
+    Raises:
+        UserError: if no walls are there.
+    """
+    box = box_around(scene.model, walls(scene.model))
+    if box is None:
+        raise UserError(
+            f"arena '{scene.arena}' has no walls: expected geoms fixed to the "
+            "world that the robot's shell can hit"
+        )
+    lower, upper = box[0][:2], box[1][:2]
+    # one shell's width of outside all around
+    border = 2 * scene.model.geom(SHELL).rbound.item() + clearance
+    size = upper - lower + 2 * border
+    spacing = max(SPACING_MIN, size.max() / NODES_MAX)
+    origin = lower - border
+    nodes = np.ceil(size / spacing).astype(int) + 1
+    shape = int(nodes[0]), int(nodes[1])
+    poses = np.zeros((shape[0] * shape[1], 3))
+    poses[:, :2] = origin + spacing * (np.indices(shape).reshape(2, -1).T)
+    checks = Batch(_with_margin(scene.model, clearance), len(poses), 1)
+    free = _free(checks, scene, poses).reshape(shape)
+    return Grid(lower, upper, origin, spacing, free, enclosed(free))
+
+
+def enclosed(free: np.ndarray) -> np.ndarray:
+    """Which free nodes of a grid `(x, y)` have no way to its edge, `(x, y)`."""
+    parts = np.empty(free.shape, np.int32)
+    ndimage.label(free, output=parts)
+    edge = np.concatenate([parts[0], parts[-1], parts[:, 0], parts[:, -1]])
+    return free & ~np.isin(parts, edge)
+
+
 class FreeSpace:
     """The poses of a scene where a robot may start."""
 
@@ -42,22 +110,16 @@ class FreeSpace:
             UserError: if no walls, no room or no inside is there.
         """
         self._scene = scene
-        self._model = _with_margin(scene.model, clearance)
-        self._checks = Batch(self._model, BLOCK, 1)
-        box = box_around(scene.model, walls(scene.model))
-        if box is None:
+        self._checks = Batch(_with_margin(scene.model, clearance), BLOCK, 1)
+        grid = survey(scene, clearance)
+        if not grid.inside.any():
             raise UserError(
-                f"arena '{scene.arena}' has no walls: expected geoms fixed to the "
-                "world that the robot's shell can hit"
+                f"arena '{scene.arena}' has no room for a start: its walls "
+                "leave no enclosed space where the robot keeps its start clearance"
             )
-        self.lower, self.upper = box[0][:2], box[1][:2]
-        # one shell's width of outside all around
-        border = 2 * scene.model.geom(SHELL).rbound.item() + clearance
-        size = self.upper - self.lower + 2 * border
-        self.spacing = max(SPACING_MIN, size.max() / NODES_MAX)
-        self.origin = self.lower - border
-        nodes = np.ceil(size / self.spacing).astype(int) + 1
-        self.inside = self._inside((int(nodes[0]), int(nodes[1])))
+        self.lower, self.upper = grid.lower, grid.upper
+        self.origin, self.spacing = grid.origin, grid.spacing
+        self.inside = grid.inside
 
     def sample(self, rng: np.random.Generator, n: int) -> np.ndarray:
         """Uniform random starts `(n, 3)`: x, y [m], yaw [rad].
@@ -80,23 +142,6 @@ class FreeSpace:
             f"arena '{self._scene.arena}' has almost no room for a start: "
             f"{len(starts)} of {n} found among {BLOCK * BLOCKS_MAX} candidates"
         )
-
-    def _inside(self, shape: tuple[int, int]) -> np.ndarray:
-        """Which grid nodes are free and enclosed by walls, `shape`."""
-        poses = np.zeros((shape[0] * shape[1], 3))
-        poses[:, :2] = self.origin + self.spacing * (np.indices(shape).reshape(2, -1).T)
-        checks = Batch(self._model, len(poses), 1)
-        free = _free(checks, self._scene, poses).reshape(shape)
-        parts = np.empty(shape, np.int32)
-        ndimage.label(free, output=parts)
-        edge = np.concatenate([parts[0], parts[-1], parts[:, 0], parts[:, -1]])
-        inside = free & ~np.isin(parts, edge)
-        if not inside.any():
-            raise UserError(
-                f"arena '{self._scene.arena}' has no room for a start: its walls "
-                "leave no enclosed space where the robot keeps its start clearance"
-            )
-        return inside
 
     def _near_inside(self, points: np.ndarray) -> np.ndarray:
         """Whether one of the four nodes around each point `(n, 2)` is inside."""

@@ -1,0 +1,55 @@
+"""`python -m epuck_mj.check ARENA`: what is there, and what is wrong.
+
+Exit status 0 if the arena is usable, 1 if errors were found in it, and 2, as for all
+command lines here, if there is no arena to look at: bad options, no file, no text.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from epuck_mj.check import check_arena, report
+from epuck_mj.check.picture import region_figure, save_picture
+from epuck_mj.command_line import main, parse
+from epuck_mj.model import SHIPPED_ROBOTS
+
+
+@dataclass(frozen=True)
+class Options:
+    """Check an arena: walls, room, sensors, contacts, speed.
+
+    Exit status 1 if it cannot be used.
+    """
+
+    arena: tyro.conf.Positional[str]
+    """name of a shipped arena, or path of an MJCF"""
+    robot: str | None = None
+    """name of a shipped robot, or path of an MJCF; both shipped ones by default"""
+    picture: Path | None = None
+    """PNG to write: the walls from above, and where robots may start"""
+
+
+def run(argv: Sequence[str]) -> int:
+    """Check and print; the exit status.
+
+    Raises:
+        UserError: if there is no arena to look at, or no place for the picture.
+    """
+    options = parse(Options, "python -m epuck_mj.check", argv)
+    shipped = [Path(name).stem for name in SHIPPED_ROBOTS]
+    checked = check_arena(options.arena, [options.robot] if options.robot else shipped)
+    for line in report.lines(checked.arena, checked.findings):
+        print(line)
+    if options.picture and checked.scene and checked.grid:
+        figure = region_figure(checked.scene, checked.grid, checked.arena.stem)
+        save_picture(figure, options.picture)
+        print(f"picture: {options.picture}")
+    elif options.picture:
+        print("no picture: there are no walls to draw")
+    return 0 if report.usable(checked.findings) else 1
+
+
+if __name__ == "__main__":
+    main(run)

@@ -1,0 +1,62 @@
+"""A robot's sensors and actuators, with what they read at a start."""
+
+import mujoco
+import numpy as np
+
+from epuck_mj.check.findings import Finding, info
+from epuck_mj.constants import PROXIMITY_RANGE
+from epuck_mj.model import Scene
+
+_SENSOR = mujoco.mjtSensor
+
+UNITS = {
+    _SENSOR.mjSENS_RANGEFINDER: f" m (controllers see up to {PROXIMITY_RANGE:.2f} m)",
+    _SENSOR.mjSENS_CONTACT: " contacts",
+    _SENSOR.mjSENS_GYRO: " rad/s",
+    _SENSOR.mjSENS_VELOCIMETER: " m/s",
+    _SENSOR.mjSENS_ACCELEROMETER: " m/s^2",
+}
+"""Units of the sensors that a robot may well have."""
+
+
+def part_findings(scene: Scene, start: np.ndarray, topic: str) -> list[Finding]:
+    """What the robot senses and what drives it, at rest on a start `(3,)`."""
+    model, data = scene.model, mujoco.MjData(scene.model)
+    data.qpos[:] = scene.qpos(start)
+    mujoco.mj_forward(model, data)
+    x, y, yaw = start
+    where = f"start: x {x:.3f} m, y {y:.3f} m, heading {np.degrees(yaw):.0f} deg"
+    readings: dict[int, list[str]] = {}
+    for sensor in range(model.nsensor):
+        kind, name = int(model.sensor_type[sensor]), model.sensor(sensor).name
+        address, size = model.sensor_adr[sensor], model.sensor_dim[sensor]
+        values = data.sensordata[address : address + size]
+        readings.setdefault(kind, []).append(f"{name} {_shown(kind, values)}".strip())
+    sensors = [
+        info(
+            topic,
+            f"{_SENSOR(kind).name.removeprefix('mjSENS_').lower()}: "
+            f"{', '.join(shown)}{UNITS.get(_SENSOR(kind), '')}",
+        )
+        for kind, shown in readings.items()
+    ]
+    actuators = []
+    for actuator in range(model.nu):
+        low, high = model.actuator_ctrlrange[actuator]
+        limits = (
+            f" {low:.2f} to {high:.2f}" if model.actuator_ctrllimited[actuator] else ""
+        )
+        # of a velocity servo: the speed that it is told to keep
+        speed = data.actuator_velocity[actuator]
+        actuators.append(f"{model.actuator(actuator).name}{limits}, now {speed:.2f}")
+    driven = f"actuators: {'; '.join(actuators)}"
+    return [info(topic, where), *sensors, info(topic, driven)]
+
+
+def _shown(kind: int, values: np.ndarray) -> str:
+    """What a sensor reads."""
+    if kind == _SENSOR.mjSENS_RANGEFINDER and values[0] < 0:
+        return "nothing"
+    digits = 0 if kind == _SENSOR.mjSENS_CONTACT else 3
+    # no -0.000
+    return " ".join(f"{round(float(value), digits) + 0:.{digits}f}" for value in values)

@@ -1,0 +1,76 @@
+"""A picture of an arena from above: its walls, and where robots may start."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from epuck_mj.colors import GREEN, ORANGE
+from epuck_mj.files import write_bytes, writing
+from epuck_mj.model import Scene
+from epuck_mj.outline import shell_outline, wall_outlines
+from epuck_mj.starts import Grid
+
+WALL = "0.45"
+
+
+def region_figure(scene: Scene, grid: Grid, title: str) -> Figure:
+    """Walls, and the free region that they enclose, or what leaks out if none is.
+
+    Args:
+        scene: robot and arena.
+        grid: where the robot fits.
+        title: above the axes.
+    """
+    enclosed = bool(grid.inside.any())
+    region = grid.inside if enclosed else grid.free
+    color, meaning = (
+        (GREEN, "may start") if enclosed else (ORANGE, "fits, not enclosed")
+    )
+    rgb = (color[0] / 255, color[1] / 255, color[2] / 255)
+    # half a node beyond the first and the last
+    low = grid.origin - grid.spacing / 2
+    high = low + grid.spacing * np.array(region.shape)
+    figure = Figure(figsize=(6, 6), layout="constrained")
+    axes = figure.add_subplot()
+    axes.imshow(
+        np.where(region, 1.0, np.nan).T,
+        cmap=ListedColormap([rgb]),
+        alpha=0.5,
+        origin="lower",
+        extent=(low[0], high[0], low[1], high[1]),
+        interpolation="nearest",
+    )
+    axes.add_collection(
+        PolyCollection(wall_outlines(scene), facecolor=WALL, edgecolor=WALL)
+    )
+    shell = shell_outline(scene)
+    if enclosed:
+        # the robot, for scale, on the node farthest along the diagonal
+        shell = shell + grid.nodes[grid.inside][-1]
+        axes.fill(*shell.T, facecolor="none", edgecolor="black")
+    legend = [
+        Patch(facecolor=rgb, alpha=0.5, label=f"robot's middle {meaning}"),
+        Patch(facecolor=WALL, label="walls"),
+    ]
+    figure.legend(handles=legend, loc="outside lower center", ncols=2, frameon=False)
+    axes.set(title=title, xlabel="x [m]", ylabel="y [m]", aspect="equal")
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    return figure
+
+
+def save_picture(figure: Figure, path: Path) -> None:
+    """Write a PNG; equal figures make equal files.
+
+    Raises:
+        UserError: if it cannot be written.
+    """
+    picture = io.BytesIO()
+    # matplotlib would name its version
+    figure.savefig(picture, format="png", dpi=120, metadata={"Software": None})
+    with writing(path):
+        write_bytes(path, picture.getvalue())

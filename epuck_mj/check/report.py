@@ -1,0 +1,68 @@
+"""How findings are printed: as plain lines under headings, errors last."""
+
+import os
+import textwrap
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from epuck_mj.check.findings import Finding, Place, Severity
+
+WIDTH = 88
+
+PLURALS = {Severity.ERROR: "errors", Severity.WARNING: "warnings"}
+
+
+def lines(arena: Path, findings: Sequence[Finding]) -> Iterator[str]:
+    """What is there, by topic; then what is wrong, a line each; then the outcome."""
+    there = [finding for finding in findings if finding.severity is Severity.INFO]
+    for topic in dict.fromkeys(finding.topic for finding in there):
+        yield topic
+        for finding in there:
+            if finding.topic == topic:
+                yield from _wrapped(finding.text)
+    for severity in (Severity.WARNING, Severity.ERROR):
+        yield from (_wrong(f) for f in findings if f.severity is severity)
+    outcome = "usable" if usable(findings) else "not usable"
+    counts = ", ".join(_count(findings, severity) for severity in PLURALS)
+    yield f"{_shown(arena)}: {outcome}; {counts}"
+
+
+def usable(findings: Sequence[Finding]) -> bool:
+    """Whether no finding is an error."""
+    return all(finding.severity is not Severity.ERROR for finding in findings)
+
+
+def _wrapped(text: str) -> list[str]:
+    """An indented paragraph."""
+    return textwrap.wrap(
+        text,
+        WIDTH,
+        initial_indent="  ",
+        subsequent_indent="    ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def _wrong(finding: Finding) -> str:
+    """One line as compilers write it, so that editors find the place."""
+    if finding.place is None:
+        return f"{finding.severity}: {finding.topic}: {finding.text}"
+    element = finding.place.element
+    about = f"{element}: " if element else ""
+    return f"{_where(finding.place)}: {finding.severity}: {about}{finding.text}"
+
+
+def _where(place: Place) -> str:
+    return f"{_shown(place.file)}:{place.line}" if place.line else _shown(place.file)
+
+
+def _shown(path: Path) -> str:
+    """A path as a person here would type it."""
+    near = os.path.relpath(path)
+    return str(path) if near.startswith("..") else near
+
+
+def _count(findings: Sequence[Finding], severity: Severity) -> str:
+    n = sum(finding.severity is severity for finding in findings)
+    return f"{n} {severity if n == 1 else PLURALS[severity]}"

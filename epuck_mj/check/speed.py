@@ -1,0 +1,95 @@
+"""How fast a scene runs here and now."""
+
+import time
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+
+from epuck_mj.check.findings import Finding, Place, info, warning
+from epuck_mj.control import TaskParameters, control_step
+from epuck_mj.model import TIMESTEP, Scene
+from epuck_mj.sensors import observe
+from epuck_mj.simulation import SimulatedRobots
+from epuck_mj.wall_follower import WallFollower
+
+MEASURED = 0.15
+"""Duration of each of the two measurements [s]."""
+
+CONVERGED = 0.01
+"""Longest physics step that is fine enough for the robot on wheels [s].
+
+Source: benchmarks/convergence.md.
+"""
+
+
+def speed_findings(
+    scene: Scene, start: np.ndarray, topic: str, place: Place
+) -> list[Finding]:
+    """Steps per second of one robot on one thread, from a start `(3,)` on.
+
+    Args:
+        scene: robot and arena.
+        start: where the robot starts, and starts again after a crash.
+        topic: heading of the findings.
+        place: where the physics step is set.
+    """
+    task = TaskParameters()
+    physics, _ = _rates(_standing(scene, start))
+    control, per_cpu = _rates(_driving(scene, start, task))
+    n = scene.n_substeps
+    findings = [
+        info(
+            topic,
+            f"a control step of {task.control_step:g} s is {n} physics steps of "
+            f"{scene.model.opt.timestep:g} s",
+        ),
+        info(
+            topic,
+            f"speed, measured now with one robot on one thread: {physics * n:,.0f} "
+            f"physics steps/s; {control:,.0f} control steps/s with a controller, which "
+            f"is {per_cpu * task.control_step:,.0f} simulated s per CPU second",
+        ),
+    ]
+    step = scene.model.opt.timestep
+    if step > CONVERGED and not _has_step(scene.model):
+        text = f"a physics step of {step:g} s is too coarse for wheels; "
+        findings.append(
+            warning(topic, f"{text}expected at most {CONVERGED:g} s", place)
+        )
+    return findings
+
+
+def _has_step(model: mujoco.MjModel) -> bool:
+    """Whether the robot brings a physics step of its own."""
+    kind = mujoco.mjtObj.mjOBJ_NUMERIC.value
+    return mujoco.mj_name2id(model, kind, TIMESTEP) >= 0
+
+
+def _standing(scene: Scene, start: np.ndarray) -> Iterator[None]:
+    """Control steps of a robot that is told to stand still, for ever."""
+    robots = SimulatedRobots(scene, 1, 1)
+    robots.reset(start[None])
+    while True:
+        robots.step(np.zeros((1, 2)))
+        yield
+
+
+def _driving(scene: Scene, start: np.ndarray, task: TaskParameters) -> Iterator[None]:
+    """Control steps of a robot with a controller, for ever."""
+    robots, policy = SimulatedRobots(scene, 1, 1), WallFollower()
+    while True:
+        reading = robots.reset(start[None])
+        while not reading.contact[0]:
+            observation = observe(reading.distance, task.sensor_range)
+            reading = control_step(robots, policy, observation, task).reading
+            yield
+
+
+def _rates(steps: Iterator[None]) -> tuple[float, float]:
+    """How many steps are done per second, and per second of CPU time."""
+    start, cpu, n = time.perf_counter(), time.process_time(), 0
+    while (elapsed := time.perf_counter() - start) < MEASURED:
+        next(steps)
+        n += 1
+    return n / elapsed, n / max(time.process_time() - cpu, 1e-9)

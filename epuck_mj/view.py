@@ -1,0 +1,260 @@
+"""A champion in MuJoCo's own viewer: `python -m epuck_mj.view my.xml champion.json`.
+
+It drives at real time, trial after trial on new starts, until the window is closed. A
+crash ends a trial. What the window shows is the trial itself, step by step: the same
+start gives the trajectory of `epuck_mj.trajectory.record`, to the last bit.
+"""
+
+import importlib
+import itertools
+import re
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import tyro
+
+from epuck_mj.command_line import main, parse
+from epuck_mj.control import ControlStep, Policy, TaskParameters, control_step
+from epuck_mj.controller import load
+from epuck_mj.errors import UserError
+from epuck_mj.model import Scene, load_scene
+from epuck_mj.sensors import Reading, observe
+from epuck_mj.starts import FreeSpace
+from epuck_mj.tasks import START_CLEARANCE
+from epuck_mj.wall_follower import WallFollower
+
+LATE_MAX = 0.2
+"""How late the picture may be before time that was lost is given up [s]."""
+
+CLOSING_MAX = 5.0
+"""How long the viewer's own thread may take to end [s]."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Watch a controller drive in MuJoCo's viewer, until its window is closed."""
+
+    arena: tyro.conf.Positional[str]
+    """name of a shipped arena, or path of an MJCF"""
+    champion: tyro.conf.Positional[Path | None] = None
+    """controller file (JSON); the wall follower written by hand by default"""
+    robot: str = "epuck"
+    """name of a shipped robot, or path of an MJCF"""
+    pose: tuple[float, float, float] | None = None
+    """start of every trial: x, y [m], heading [degrees]; random ones by default"""
+    seconds: float | None = None
+    """duration of a trial [s]; the controller's own by default"""
+    seed: int = 0
+    """of the random starts"""
+
+
+class WatchedRobot:
+    """One robot in an `MjData` that others can look at after every physics step.
+
+    It starts and moves as `epuck_mj.simulation.SimulatedRobots` does.
+    """
+
+    def __init__(self, scene: Scene, moved: Callable[[], None] = lambda: None):
+        """Allocate the robot.
+
+        Args:
+            scene: robot and arena.
+            moved: called when the robot was reset and after every physics step.
+        """
+        self.scene = scene
+        self.data = mujoco.MjData(scene.model)
+        self.moved = moved
+
+    def reset(self, start: np.ndarray) -> Reading:
+        """Put the robot at rest on a start `(3,)`: x, y [m], yaw [rad]."""
+        model, data = self.scene.model, self.data
+        mujoco.mj_resetData(model, data)
+        data.qpos[:] = self.scene.qpos(start)
+        mujoco.mj_step1(model, data)
+        self.moved()
+        return self._reading()
+
+    def step(self, command: np.ndarray) -> Reading:
+        """Drive for one control step.
+
+        Args:
+            command: wheel speeds [rad/s], `(1, 2)`.
+        """
+        model, data = self.scene.model, self.data
+        data.ctrl[self.scene.wheels] = command[0]
+        for _ in range(self.scene.n_substeps):
+            # the second half first: positions and sensors are always those of now
+            mujoco.mj_step2(model, data)
+            mujoco.mj_step1(model, data)
+            self.moved()
+        return self._reading()
+
+    def _reading(self) -> Reading:
+        return self.scene.reading(self.data.sensordata[None].copy())
+
+
+def drive(
+    robot: WatchedRobot, policy: Policy, start: np.ndarray, task: TaskParameters
+) -> Iterator[ControlStep]:
+    """The control steps of one trial, ended by a crash or after `task.steps`."""
+    reading = robot.reset(start)
+    observation = observe(reading.distance, task.sensor_range)
+    for _ in range(task.steps):
+        step = control_step(robot, policy, observation, task)
+        observation = step.observation
+        yield step
+        if step.reading.contact[0]:
+            return
+
+
+class Clock:
+    """Lets simulated time pass no faster than real time."""
+
+    def __init__(self) -> None:
+        """Start now."""
+        self._due = time.perf_counter()
+
+    def wait(self, seconds: float) -> None:
+        """Sleep until that much time has passed since the last call."""
+        self._due += seconds
+        left = self._due - time.perf_counter()
+        if left > 0:
+            time.sleep(left)
+        elif left < -LATE_MAX:
+            # after a pause of the machine, no rush to catch up
+            self._due = time.perf_counter()
+
+
+def watch(
+    window: Any,
+    robot: WatchedRobot,
+    policy: Policy,
+    starts: Iterator[np.ndarray],
+    task: TaskParameters,
+) -> Iterator[str]:
+    """Trials in a window until it is closed or no start is left; a line for each.
+
+    Args:
+        window: MuJoCo's handle of its viewer: `sync`, `is_running`.
+        robot: the one that the window shows.
+        policy: called with observations `(1, 8)`, gives actions `(1, 2)`.
+        starts: poses `(3,)`: x, y [m], yaw [rad].
+        task: what a trial is.
+    """
+    clock, step = Clock(), robot.scene.model.opt.timestep
+
+    def show() -> None:
+        window.sync()
+        clock.wait(step)
+
+    robot.moved = show
+    for number, start in enumerate(starts, 1):
+        fitness, crashed, n_steps = 0.0, False, 0
+        for done in drive(robot, policy, start, task):
+            fitness += float(done.fitness[0])
+            crashed, n_steps = bool(done.reading.contact[0]), n_steps + 1
+            if not window.is_running():
+                return
+        end = "crash" if crashed else "no crash"
+        yield (
+            f"trial {number}: fitness {fitness:.1f} of {task.steps}, {end} after "
+            f"{n_steps * task.control_step:.1f} s"
+        )
+
+
+@contextmanager
+def open_window(model: mujoco.MjModel, data: mujoco.MjData) -> Iterator[Any]:
+    """MuJoCo's passive viewer on a model and its state, until the block ends.
+
+    Raises:
+        UserError: if there is no display, or no OpenGL on it.
+    """
+    others = set(threading.enumerate())
+    try:
+        # looks for libraries: only here
+        glfw, viewer = map(importlib.import_module, ("glfw", "mujoco.viewer"))
+        with warnings.catch_warnings():
+            # the exception says the same
+            warnings.simplefilter("error")
+            # asked first: the viewer's own thread would die and be waited for
+            if not glfw.init():
+                raise RuntimeError("GLFW cannot be initialised")
+            # that OpenGL is there as well shows only with a window
+            glfw.window_hint(glfw.VISIBLE, glfw.FALSE)
+            glfw.destroy_window(glfw.create_window(64, 64, "", None, None))
+            glfw.default_window_hints()
+        window = viewer.launch_passive(model, data, show_right_ui=False)
+    except Exception as problem:  # whatever libraries and drivers come up with
+        reason = re.sub(r"^\(\d+\) b'(.*)'$", r"\1", " ".join(str(problem).split()))
+        raise UserError(
+            f"cannot open a window ({reason}): expected a display with OpenGL; "
+            "without one, see python -m epuck_mj.render"
+        ) from None
+    try:
+        yield window
+    finally:
+        window.close()
+        # GLFW ends with the process, and must not do so below the viewer's thread
+        for thread in set(threading.enumerate()) - others:
+            thread.join(CLOSING_MAX)
+
+
+def run(argv: Sequence[str]) -> int:
+    """Watch; the exit status.
+
+    Raises:
+        UserError: for anything a user can put right.
+    """
+    options = parse(Options, "python -m epuck_mj.view", argv)
+    policy: Policy = WallFollower()
+    task = TaskParameters()
+    if options.champion is not None:
+        file = load(options.champion)
+        policy, task = file.controller, TaskParameters.from_dict(file.task)
+    if options.seconds is not None:
+        ratio = options.seconds / task.control_step
+        if not 0.5 <= ratio < float("inf"):
+            raise UserError(
+                f"expected --seconds of at least a control step, "
+                f"{task.control_step:g} s, got {options.seconds:g}"
+            )
+        task = replace(task, steps=round(ratio))
+    scene = load_scene(options.robot, options.arena, task.control_step)
+    starts = _starts(scene, options)
+    robot = WatchedRobot(scene)
+    robot.reset(next(starts))
+    with open_window(scene.model, robot.data) as window:
+        with window.lock():
+            # rays go on for ever; controllers see four centimetres of them
+            window.opt.flags[mujoco.mjtVisFlag.mjVIS_RANGEFINDER] = False
+        for line in watch(window, robot, policy, starts, task):
+            print(line, flush=True)
+    return 0
+
+
+def _starts(scene: Scene, options: Options) -> Iterator[np.ndarray]:
+    """Where trials start, for ever.
+
+    Raises:
+        UserError: if the arena has no room, or the pose is not one.
+    """
+    if options.pose is not None:
+        pose = np.array(options.pose)
+        if not np.isfinite(pose).all():
+            raise UserError(f"expected --pose of three numbers, got {options.pose}")
+        pose[2] = np.radians(pose[2])
+        return itertools.repeat(pose)
+    space, rng = FreeSpace(scene, START_CLEARANCE), np.random.default_rng(options.seed)
+    return (space.sample(rng, 1)[0] for _ in itertools.count())
+
+
+if __name__ == "__main__":
+    main(run)

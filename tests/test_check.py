@@ -1,0 +1,494 @@
+"""The check of an arena: each finding by a bad arena and a good one, with its line."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from epuck_mj.check import check_arena, report
+from epuck_mj.check.__main__ import run
+from epuck_mj.check.findings import Severity
+from epuck_mj.check.walls import seen_by_rays
+from epuck_mj.errors import UserError
+from epuck_mj.model import MODELS
+
+ROBOTS = ("epuck", "epuck_planar")
+SHIPPED = [path.stem for path in sorted(MODELS.glob("arenas/*.xml"))] + ["arena"]
+
+ARENA = """\
+<mujoco>
+  <option timestep="0.01" integrator="implicitfast"/>
+  <asset>
+    <material name="glass" rgba="1 1 1 0"/>
+  </asset>
+  <worldbody>
+    <geom name="floor" type="plane" size="1 1 1" contype="2" conaffinity="2"/>
+    <geom name="east" type="box" pos="0.31 0 0.03" size="0.01 0.32 0.03"/>
+    <geom name="west" type="box" pos="-0.31 0 0.03" size="0.01 0.32 0.03"/>
+    <geom name="north" type="box" pos="0 0.31 0.03" size="0.3 0.01 0.03"/>
+    <geom name="south" type="box" pos="0 -0.31 0.03" size="0.3 0.01 0.03"/>
+    <!-- more -->
+  </worldbody>
+</mujoco>
+"""
+EAST, MORE = 8, 12
+"""Lines of the eastern wall, and of what is added."""
+
+EAST_GEOM = '<geom name="east" type="box" pos="0.31 0 0.03" size="0.01 0.32 0.03"/>'
+
+
+@pytest.fixture(autouse=True)
+def short(monkeypatch):
+    """Nobody here needs to know how fast it is."""
+    monkeypatch.setattr("epuck_mj.check.speed.MEASURED", 0.005)
+
+
+@pytest.fixture
+def check(tmp_path, monkeypatch, capsys):
+    """Checks a text in a folder of its own: exit status and printed lines."""
+    monkeypatch.chdir(tmp_path)
+
+    def check(text: str, *arguments: str) -> tuple[int, list[str]]:
+        Path("my.xml").write_text(text)
+        status = run(["my.xml", *arguments])
+        return status, capsys.readouterr().out.splitlines()
+
+    return check
+
+
+def with_more(xml: str) -> str:
+    return ARENA.replace("<!-- more -->", xml)
+
+
+def wrong(lines: list[str]) -> list[str]:
+    return [line for line in lines if re.search(r": (error|warning): ", line)]
+
+
+@pytest.mark.parametrize("arena", SHIPPED)
+def test_shipped_arenas_have_nothing_wrong(arena):
+    checked = check_arena(arena, ROBOTS)
+    assert report.usable(checked.findings)
+    assert {finding.severity for finding in checked.findings} == {Severity.INFO}
+    topics = list(dict.fromkeys(finding.topic for finding in checked.findings))
+    assert topics == ["walls", "room", "robot epuck", "robot epuck_planar"]
+
+
+def test_a_good_arena_is_described(check):
+    status, lines = check(ARENA)
+    text = " ".join(" ".join(lines).split())
+    assert status == 0
+    assert "4 found: 4 of type box names: east, west, north, south" in text
+    assert "box around them: x -0.320 to 0.320 m, y -0.320 to 0.320 m" in text
+    # 0.6 m between walls, less twice radius and clearance
+    area = re.search(r"robots may start on (\S+) m\^2", text)
+    assert area
+    assert float(area[1]) == pytest.approx((0.6 - 2 * 0.045) ** 2, abs=0.02)
+    assert "1 region" in text
+    for part in ("ps0 ", "ps7 ", "shell 0 contacts", "gyro", "velocimeter"):
+        assert part in text
+    assert "wheel_left -6.28 to 6.28" in text
+    assert "touch: floor and wheel_left, floor and wheel_right" in text
+    assert "touch: nothing" in text
+    assert re.search(r"[\d,]+ physics steps/s; [\d,]+ control steps/s", text)
+    assert "simulated s per CPU second" in text
+    assert lines[-1] == "my.xml: usable; 0 errors, 0 warnings"
+    assert max(map(len, lines)) <= 88
+
+
+def test_one_robot_only(check):
+    _, lines = check(ARENA, "--robot", "epuck_planar")
+    assert "robot epuck_planar" in lines
+    assert "robot epuck" not in lines
+
+
+def east(text: str) -> str:
+    return ARENA.replace(EAST_GEOM, text)
+
+
+ERRORS = {
+    "alpha of a geom": (
+        east(EAST_GEOM.replace("/>", ' rgba="1 0 0 0"/>')),
+        f'my.xml:{EAST}: error: <geom name="east">: rays cannot see it: alpha 0',
+    ),
+    "alpha of a material": (
+        east(EAST_GEOM.replace("/>", ' rgba="1 0 0 1" material="glass"/>')),
+        f'my.xml:{EAST}: error: <geom name="east">: rays cannot see it: alpha 0 of '
+        "material 'glass'",
+    ),
+    "low wall": (
+        with_more('<geom name="kerb" type="box" pos="0 0 .01" size=".05 .05 .01"/>'),
+        f'my.xml:{MORE}: error: <geom name="kerb">: rays cannot see it: it ends at '
+        "20.0 mm, rays run at 33.0 mm",
+    ),
+    "floating wall": (
+        with_more('<geom name="bar" type="box" pos="0 0 .06" size=".05 .05 .02"/>'),
+        f'my.xml:{MORE}: error: <geom name="bar">: rays cannot see it: it begins at '
+        "40.0 mm, rays run at 33.0 mm",
+    ),
+    "floor of a box": (
+        with_more('<geom name="slab" type="box" pos="0 0 -.01" size="1 1 .01"/>'),
+        f'my.xml:{MORE}: error: <geom name="slab">: it lies below the shell',
+    ),
+    "floor with the bits of a wall": (
+        ARENA.replace(' contype="2" conaffinity="2"', ""),
+        'my.xml:7: error: <geom name="floor">: the robot\'s shell would hit this plane',
+    ),
+    "plane as a wall": (
+        with_more('<geom type="plane" pos="0.2 0 0" size="1 1 1" zaxis="-1 0 0"/>'),
+        f"my.xml:{MORE}: error: <geom>: a plane cannot be a wall",
+    ),
+    "height field": (
+        with_more('<geom type="hfield" hfield="hills" pos="0.2 0.2 0"/>').replace(
+            "</asset>",
+            '<hfield name="hills" nrow="2" ncol="2" size=".1 .1 .05 .01" '
+            'elevation="0 1 1 0"/></asset>',
+        ),
+        f"my.xml:{MORE}: error: <geom>: a wall cannot be of type hfield",
+    ),
+    "no floor": (
+        "\n".join(line for line in ARENA.splitlines() if "floor" not in line),
+        "has no floor for the robot's wheels",
+    ),
+    "floor too low": (
+        ARENA.replace('<geom name="floor"', '<geom name="floor" pos="0 0 -0.02"'),
+        "my.xml: error: robots do not stay where they are put",
+    ),
+    "gap": (
+        east(""),
+        "my.xml: error: the walls enclose nothing: expected walls all around",
+    ),
+    "door": (
+        east(EAST_GEOM.replace("0.31 0 0.03", "0.31 0.14 0.03")),
+        "my.xml: error: the walls enclose nothing: there is a way out about 0.1",
+    ),
+    "no room": (
+        re.sub(r"0\.31", "0.045", ARENA),
+        "my.xml: error: no room for a start",
+    ),
+    "no walls": (
+        re.sub(r".*type=\"box\".*\n", "", ARENA),
+        "my.xml: error: arena '",
+    ),
+    "control step": (
+        ARENA.replace("0.01", "0.03", 1),
+        "my.xml:2: error: <option>: expected a control step that is a multiple",
+    ),
+    "endless control step": (
+        ARENA.replace("0.01", "1e-9", 1),
+        "my.xml:2: error: <option>: a control step would be 100,000,000 physics steps",
+    ),
+    "no physics step": (
+        ARENA.replace("0.01", "0", 1),
+        "my.xml:2: error: <option>: ",
+    ),
+    "nowhere": (
+        with_more('<geom type="box" pos="1e30 0 0" size="1 1 1"/>'),
+        f"my.xml:{MORE}: error: <geom>: expected finite numbers",
+    ),
+    "robot of its own": (
+        with_more('<body name="epuck"/>'),
+        f'my.xml:{MORE}: error: <body name="epuck">: arena ',
+    ),
+    "name of the robot's": (
+        with_more('<geom name="shell" size=".1"/>'),
+        "repeated name 'shell' in geom",
+    ),
+    "attribute": (
+        with_more('<geom sise=".1"/>'),
+        f"my.xml:{MORE}: error: <geom>: MuJoCo: Schema violation: unrecognized "
+        "attribute: 'sise'",
+    ),
+    "element": (with_more("<goem/>"), f"my.xml:{MORE}: error: <goem>: MuJoCo: "),
+    "size": (with_more('<geom size="-1"/>'), f"my.xml:{MORE}: error: <geom>: MuJoCo: "),
+    "class": (
+        with_more('<geom class="wall" size="1"/>'),
+        f'my.xml:{MORE}: error: <geom class="wall">: MuJoCo: unknown default class',
+    ),
+    "mesh": (
+        with_more('<geom type="mesh" mesh="no"/>'),
+        f"my.xml:{MORE}: error: <geom>: MuJoCo: mesh 'no' not found",
+    ),
+    "file": (
+        ARENA.replace("<asset>", '<asset><mesh name="m" file="no.stl"/>'),
+        'my.xml:3: error: <mesh name="m">: MuJoCo: ',
+    ),
+    "include that is not there": (
+        ARENA.replace("<asset>", '<include file="walls.xml"/><asset>'),
+        'my.xml:3: error: <include file="walls.xml">: no file ',
+    ),
+    "include of nothing": (
+        ARENA.replace("<asset>", "<include/><asset>"),
+        "my.xml:3: error: <include>: no file ",
+    ),
+    "tag": (
+        ARENA.replace("</asset>", "</assets>"),
+        "my.xml:5: error: not well-formed XML: mismatched tag",
+    ),
+    "half a file": (ARENA[:300], "error: not well-formed XML: "),
+    "no file at all": ("", "my.xml:1: error: not well-formed XML: no element found"),
+    "not XML": ("{}", "my.xml:1: error: not well-formed XML: "),
+    "another root": ("<robot>\n</robot>", "my.xml: error: expected the file to end"),
+    "empty root": ("<mujoco/>", "my.xml: error: expected the file to end"),
+    "space in the last tag": (
+        ARENA.replace("</mujoco>", "</mujoco >"),
+        "my.xml: error: expected the file to end with </mujoco>",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ERRORS)
+def test_errors_name_the_line(check, name):
+    text, expected = ERRORS[name]
+    status, lines = check(text)
+    found = wrong(lines)
+    assert status == 1
+    assert any(expected in line for line in found), found
+    assert "not usable" in lines[-1]
+
+
+WARNINGS = {
+    "ghost": (
+        with_more('<geom size=".05" pos="0 0 .03" contype="0" conaffinity="0"/>'),
+        f"my.xml:{MORE}: warning: <geom>: rays see it, but the shell cannot hit it",
+    ),
+    "lamp": (
+        with_more('<geom name="lamp" size=".05" pos="0 0 .5"/>'),
+        f'my.xml:{MORE}: warning: <geom name="lamp">: the robot passes below it',
+    ),
+    "cellar": (
+        with_more('<geom size=".05" pos="0 0 -.5"/>'),
+        f"my.xml:{MORE}: warning: <geom>: the robot passes above it",
+    ),
+    "ball": (
+        with_more('<body pos="0 0 .05"><freejoint/><geom size=".05"/></body>'),
+        f"my.xml:{MORE}: warning: <geom>: it moves, so it is no wall: touching it",
+    ),
+    "hollow mesh": (
+        with_more('<geom type="mesh" mesh="l" pos="-.1 -.1 0"/>').replace(
+            "</asset>",
+            '<mesh name="l" vertex="0 0 0 .1 0 0 .1 .02 0 .02 .02 0 .02 .1 0 0 .1 0 '
+            '0 0 .1 .1 0 .1 .1 .02 .1 .02 .02 .1 .02 .1 .1 0 .1 .1" '
+            'face="0 2 1 0 3 2 0 4 3 0 5 4 6 7 8 6 8 9 6 9 10 6 10 11 '
+            "0 1 7 0 7 6 1 2 8 1 8 7 2 3 9 2 9 8 3 4 10 3 10 9 4 5 11 4 11 10 "
+            '5 0 6 5 6 11"/></asset>',
+        ),
+        f"my.xml:{MORE}: warning: <geom>: a mesh with hollows",
+    ),
+    "coarse step": (
+        ARENA.replace("0.01", "0.02", 1),
+        "my.xml:2: warning: <option>: a physics step of 0.02 s is too coarse",
+    ),
+    "two rooms": (
+        with_more('<geom type="box" pos="0 0 .03" size=".01 .3 .03"/>'),
+        "my.xml: warning: 2 separate regions of 0.1",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WARNINGS)
+def test_warnings_name_the_line_and_leave_the_arena_usable(check, name):
+    text, expected = WARNINGS[name]
+    status, lines = check(text)
+    found = wrong(lines)
+    assert len(found) == 1, found
+    assert found[0].startswith(expected)
+    assert (status, lines[-1]) == (0, "my.xml: usable; 0 errors, 1 warning")
+
+
+GOOD = {
+    # rays pass, robots do not
+    "narrow gap": east(EAST_GEOM.replace("0.01 0.32", "0.01 0.29")),
+    "half transparent": east(EAST_GEOM.replace("/>", ' rgba="1 0 0 0.1"/>')),
+    "hidden group": east(EAST_GEOM.replace("/>", ' group="5"/>')),
+    # a material's alpha counts before the geom's
+    "paint": with_more(
+        '<geom type="box" size=".02 .02 .03" pos="0 0 .03" material="red"/>'
+    ).replace("</asset>", '<material name="red" rgba="1 0 0 1"/></asset>'),
+    "marks on the floor": with_more(
+        '<geom type="box" size=".1 .1 .0001" contype="0" conaffinity="0"/>'
+    ),
+    "convex mesh": with_more('<geom type="mesh" mesh="m" pos="0 0 0"/>').replace(
+        "</asset>",
+        '<mesh name="m" vertex="0 0 0 .1 0 0 0 .1 0 0 0 .1"/></asset>',
+    ),
+    "floor of a box with the right bits": ARENA.replace(
+        'type="plane" size="1 1 1"', 'type="box" size="1 1 .01" pos="0 0 -.01"'
+    ),
+}
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_no_false_alarm(check, name):
+    status, lines = check(GOOD[name])
+    assert (status, wrong(lines)) == (0, [])
+
+
+def test_lines_within_replicates_frames_and_includes(check, tmp_path):
+    ghosts = 'contype="0" conaffinity="0"'
+    (tmp_path / "more.xml").write_text(
+        "<mujoco>\n <worldbody>\n"
+        f'  <geom name="far" size=".02" pos="0.1 0.1 .03" {ghosts}/>\n'
+        " </worldbody>\n</mujoco>\n"
+    )
+    text = ARENA.replace("<asset>", '<include file="more.xml"/>\n<asset>')
+    text = text.replace(
+        "<!-- more -->",
+        '<replicate count="2" euler="0 0 90">\n'
+        f'<geom name="r" size=".02" pos="0.1 0 .03" {ghosts}/>\n</replicate>\n'
+        f'<frame pos="-.1 0 .03">\n<geom size=".02" {ghosts}/>\n</frame>\n'
+        f'<body pos="0 -0.1 0.03">\n<geom size=".02" {ghosts}/></body>\n',
+    )
+    status, lines = check(text)
+    places = [line.split(": warning: ") for line in wrong(lines)]
+    assert status == 0
+    assert {(place, said.split(": ")[0]) for place, said in places} == {
+        ("more.xml:3", '<geom name="far">'),
+        ("my.xml:14", '<geom name="r">'),
+        ("my.xml:17", "<geom>"),
+        ("my.xml:20", "<geom>"),
+    }
+
+
+def test_errors_in_included_files_have_their_line(check, tmp_path):
+    text = ARENA.replace("<asset>", '<include file="more.xml"/>\n<asset>')
+    for content, expected in [
+        ('<mujoco>\n<worldbody>\n<geom sise="1"/></worldbody></mujoco>', ":3: error: "),
+        ("<mujoco>\n\n\n<worldbody></mujoco>", ":4: error: not well-formed XML"),
+        ('<mujoco>\n<include file="a.xml"/></mujoco>', ":2: error: <include file="),
+    ]:
+        (tmp_path / "more.xml").write_text(content)
+        status, lines = check(text)
+        assert status == 1
+        assert [line.startswith(f"more.xml{expected}") for line in wrong(lines)] == [
+            True
+        ], lines
+    twice = ARENA.replace("<asset>", '<include file="b.xml"/>' * 2 + "<asset>")
+    (tmp_path / "b.xml").write_text("<mujoco/>")
+    assert "already included" in wrong(check(twice)[1])[0]
+
+
+def test_an_arena_may_include_its_robot(check, tmp_path):
+    """Even one that is not there: it is replaced."""
+    text = ARENA.replace("<asset>", '<include file="epuck.xml"/><asset>')
+    assert check(text)[0] == 0
+    (tmp_path / "mine.xml").write_text((MODELS / "epuck.xml").read_text())
+    text = ARENA.replace("<asset>", '<include file="mine.xml"/><asset>')
+    assert check(text)[0] == 0
+
+
+def test_what_rays_see_is_what_mujoco_casts():
+    """The rule against real rays, over every way to be invisible."""
+    looks = [
+        f'rgba="1 0 0 {alpha}" {material} group="{group}" contype="{bits}"'
+        for alpha in (0, 0.01, 1)
+        for material in ("", 'material="glass"', 'material="solid"')
+        for group in (0, 5)
+        for bits in (0, 1)
+    ]
+    looks += ["", 'material="glass"', 'class="ghost"']
+    geoms = "".join(f'<geom size=".1" pos="1 {i} 0" {x}/>' for i, x in enumerate(looks))
+    sites = "".join(
+        f'<site name="s{i}" pos="0 {i} 0" zaxis="1 0 0"/>' for i in range(len(looks))
+    )
+    rays = "".join(f'<rangefinder site="s{i}"/>' for i in range(len(looks)))
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco>
+        <default><default class="ghost"><geom rgba="1 1 1 0"/></default></default>
+        <asset><material name="glass" rgba="1 1 1 0"/><material name="solid"/></asset>
+        <worldbody>{geoms}<body name="eyes">{sites}</body></worldbody>
+        <sensor>{rays}</sensor></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    np.testing.assert_array_equal(data.sensordata >= 0, seen_by_rays(model))
+    assert seen_by_rays(model).any()
+    assert not seen_by_rays(model).all()
+
+
+def test_the_gap_is_where_it_is_and_as_wide(check):
+    """A hole of 0.2 m in the north: from x = 0 to x = 0.2."""
+    north = '<geom name="north" type="box" pos="0 0.31 0.03" size="0.3 0.01 0.03"/>'
+    parts = north.replace('"0 0.31', '"-0.15 0.31').replace('"0.3 0.01', '"0.15 0.01')
+    parts += (
+        parts.replace('"-0.15', '"0.25')
+        .replace('"0.15', '"0.05')
+        .replace("north", "rest")
+    )
+    assert north in ARENA
+    _, lines = check(ARENA.replace(north, parts))
+    (line,) = wrong(lines)
+    gap = re.search(r"way out about (\S+) m wide near x (\S+) m, y (\S+) m", line)
+    assert gap, line
+    width, x, y = (float(number) for number in gap.groups())
+    assert width == pytest.approx(0.2, abs=0.03)
+    assert (x, y) == (pytest.approx(0.1, abs=0.03), pytest.approx(0.31, abs=0.05))
+
+
+def test_picture_shows_walls_and_region(check):
+    status, lines = check(ARENA, "--picture", "region.png")
+    assert (status, lines[-1]) == (0, "picture: region.png")
+    pixels = imread("region.png")[..., :3]
+    green = (pixels[..., 1] > pixels[..., 0] + 0.2).mean()
+    grey = (np.abs(pixels - 0.45) < 0.01).all(axis=-1).mean()
+    assert 0.2 < green < 0.8
+    assert grey > 0.02
+    # one that leaks shows how
+    status, lines = check(ERRORS["door"][0], "--picture", "leak.png")
+    assert (status, lines[-1]) == (1, "picture: leak.png")
+    pixels = imread("leak.png")[..., :3]
+    assert (pixels[..., 0] > pixels[..., 2] + 0.2).mean() > 0.2
+    _, lines = check("<mujoco/>", "--picture", "none.png")
+    assert not Path("none.png").exists()
+    assert lines[-1] == "no picture: there are no walls to draw"
+    with pytest.raises(UserError, match="cannot write"):
+        check(ARENA, "--picture", "no/folder.png")
+
+
+def test_bad_command_lines_are_one_line_and_status_2(tmp_path):
+    binary = tmp_path / "binary.xml"
+    binary.write_bytes(b"\xff\xfe\x00<mujoco>")
+    arena = tmp_path / "arena.xml"
+    arena.write_text(ARENA)
+    robot = tmp_path / "robot.xml"
+    robot.write_text("<mujoco><worldbody/></mujoco>")
+    for arguments, message in [
+        (("moon",), "no arena 'moon'"),
+        ((tmp_path,), "no arena"),
+        ((), "required"),
+        ((binary,), "cannot read"),
+        ((arena, "--robot", "r2d2"), "no robot 'r2d2'"),
+        ((arena, "--robot", robot), "robot.xml"),
+        ((arena, "--colour", "red"), "--colour"),
+    ]:
+        result = subprocess.run(
+            [sys.executable, "-m", "epuck_mj.check", *map(str, arguments)],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            cwd=MODELS.parent,
+        )
+        assert result.returncode == 2
+        assert result.stdout == ""
+        assert re.fullmatch(r"error: [^\n]*\n", result.stderr), result.stderr
+        assert message in result.stderr
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_damage_ends_in_a_traceback(check, seed):
+    """Characters of a good file deleted, doubled or changed at random."""
+    rng = np.random.default_rng(seed)
+    text = list(ARENA)
+    for _ in range(rng.integers(1, 4)):
+        at = rng.integers(len(text))
+        text[at] = rng.choice(["", text[at] * 2, "<", '"', "-", "0", "9", "e", "&"])
+    try:
+        status, lines = check("".join(text), "--robot", "epuck")
+    except UserError as problem:
+        assert "\n" not in str(problem)
+        return
+    assert status == int(" error: " in "\n".join(lines))

@@ -1,0 +1,253 @@
+"""The viewer's trials: those of `record` to the last bit, with a window or without."""
+
+import itertools
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from epuck_mj import view
+from epuck_mj.control import TaskParameters
+from epuck_mj.controller import ControllerFile, Network
+from epuck_mj.errors import UserError
+from epuck_mj.model import MODELS, load_scene
+from epuck_mj.starts import FreeSpace
+from epuck_mj.trajectory import record
+from epuck_mj.wall_follower import WallFollower
+
+TASK = TaskParameters(steps=120)
+
+
+def straight_on(observation):
+    action = np.zeros((*observation.shape[:-1], 2))
+    action[..., 0] = 1.0
+    return action
+
+
+@pytest.fixture
+def champion(tmp_path):
+    genome = np.random.default_rng(1).normal(size=Network().n_genes)
+    scene = {"robot": "epuck", "arena": "arena"}
+    file = ControllerFile(Network(), genome, asdict(TaskParameters()), scene, {})
+    path = tmp_path / "champion.json"
+    path.write_text(file.to_json())
+    return path
+
+
+@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
+@pytest.mark.parametrize("policy", [WallFollower(), straight_on])
+def test_a_trial_is_the_one_that_record_gives(robot, policy):
+    scene = load_scene(robot, "pillars")
+    watched = view.WatchedRobot(scene)
+    # one robot for all trials: a reset leaves nothing of the one before
+    for start in FreeSpace(scene, 0.01).sample(np.random.default_rng(0), 4):
+        recorded = record(scene, policy, start, TASK)
+        steps = list(view.drive(watched, policy, start, TASK))
+        for name in ("action", "command", "fitness"):
+            done = np.concatenate([getattr(step, name) for step in steps])
+            np.testing.assert_array_equal(done, getattr(recorded, name))
+        seen = np.concatenate([step.observation for step in steps])
+        np.testing.assert_array_equal(seen, recorded.observation[1:])
+        distance = np.concatenate([step.reading.distance for step in steps])
+        np.testing.assert_array_equal(distance, recorded.distance[1:])
+        pose = scene.poses(watched.data.qpos)
+        np.testing.assert_array_equal(pose, recorded.pose[-1])
+        assert steps[-1].reading.contact[0] == recorded.crashed
+
+
+class FakeWindow:
+    """Closes after some pictures."""
+
+    def __init__(self, pictures):
+        self.left = pictures
+
+    def sync(self):
+        self.left -= 1
+
+    def is_running(self):
+        return self.left > 0
+
+
+def test_trials_follow_each_other_until_the_window_is_closed(monkeypatch):
+    monkeypatch.setattr(view.time, "sleep", lambda seconds: None)
+    scene, start = load_scene("epuck_planar", "arena"), np.array([0.4, 0, 0])
+    task = TaskParameters(steps=20)
+    expected = record(scene, straight_on, start, task)
+    assert expected.crashed
+    window, robot = FakeWindow(400), view.WatchedRobot(scene)
+    starts = itertools.repeat(start)
+    lines = list(view.watch(window, robot, straight_on, starts, task))
+    # a crash ends a trial, and the same start gives the same trial again
+    pictures = expected.steps * scene.n_substeps + 1
+    # the last was not over when the window was closed
+    assert len(lines) == 399 // pictures
+    for number, line in enumerate(lines, 1):
+        assert line == (
+            f"trial {number}: fitness {expected.trial_fitness:.1f} of 20, crash after "
+            f"{expected.steps * 0.1:.1f} s"
+        )
+    assert window.left <= 0
+
+
+def test_simulated_time_is_real_time(monkeypatch):
+    now = 0.0
+
+    def sleep(seconds):
+        nonlocal now
+        now += seconds
+
+    monkeypatch.setattr(view.time, "perf_counter", lambda: now)
+    monkeypatch.setattr(view.time, "sleep", sleep)
+    clock = view.Clock()
+    for work in (0.0, 0.004, 0.015, 0.0):
+        now += work
+        clock.wait(0.01)
+    assert now == pytest.approx(0.04)
+    # time that was lost is not made up for
+    now += 100
+    clock.wait(0.01)
+    clock.wait(0.01)
+    assert now == pytest.approx(100.05)
+
+
+def run(*arguments, **environment):
+    return subprocess.run(
+        [sys.executable, "-m", "epuck_mj.view", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=MODELS.parent,
+        env={**os.environ, "DISPLAY": "", "WAYLAND_DISPLAY": "", **environment},
+    )
+
+
+def test_bad_input_and_no_display_are_one_line_and_status_2(champion):
+    for arguments, message in [
+        (("arena",), "cannot open a window"),
+        (("arena", champion, "--pose", 0, 0, 90), "cannot open a window"),
+        (("moon",), "no arena 'moon'"),
+        (("arena", "none.json"), "cannot read controller"),
+        (("arena", champion, "--robot", "r2d2"), "no robot 'r2d2'"),
+        (("arena", "--pose", "nan", 0, 0), "--pose"),
+        (("arena", "--seconds", 0), "--seconds"),
+        (("arena", "--seconds", "inf"), "--seconds"),
+    ]:
+        result = run(*arguments)
+        assert result.returncode == 2
+        assert result.stdout == ""
+        assert re.fullmatch(r"error: [^\n]*\n", result.stderr), result.stderr
+        assert message in result.stderr
+
+
+def test_starts_are_those_asked_for():
+    scene = load_scene("epuck_planar", "arena")
+    options = view.Options("arena", pose=(0.1, 0.2, 90.0))
+    starts = view._starts(scene, options)
+    for _ in range(2):
+        np.testing.assert_allclose(next(starts), [0.1, 0.2, np.pi / 2])
+    first, second = (
+        [next(s) for _ in range(3)]
+        for s in (view._starts(scene, view.Options("arena", seed=4)) for _ in "ab")
+    )
+    np.testing.assert_array_equal(first, second)
+    assert len(np.unique(first, axis=0)) == 3
+
+
+@pytest.fixture
+def display():
+    """A screen that nobody sees."""
+    if not shutil.which("Xvfb"):
+        pytest.skip("no Xvfb to open a window on")
+    reading, writing = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x600x24"],
+        pass_fds=[writing],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(writing)
+    with os.fdopen(reading) as file:
+        number = file.readline().strip()
+    yield f":{number}"
+    server.terminate()
+    server.wait(10)
+
+
+WINDOW = """
+import sys
+from epuck_mj import view
+from epuck_mj.command_line import main
+
+open_window = view.open_window
+def closing(model, data):
+    with open_window(model, data) as window:
+        frames = 0
+        sync = window.sync
+        def counted():
+            nonlocal frames
+            frames += 1
+            sync()
+            if frames == 30:
+                window.close()
+        window.sync = counted
+        yield window
+view.open_window = __import__("contextlib").contextmanager(closing)
+main(view.run)
+"""
+
+
+def test_a_window_opens_shows_the_robot_and_closes(display, champion):
+    result = subprocess.run(
+        [sys.executable, "-c", WINDOW, "arena", str(champion), "--seconds", "0.1"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=MODELS.parent,
+        env={**os.environ, "DISPLAY": display},
+    )
+    if "cannot open a window" in result.stderr:
+        pytest.skip(f"no OpenGL on Xvfb: {result.stderr}")
+    assert (result.returncode, result.stderr) == (0, "")
+    # 30 pictures of 10 ms: trials of 0.1 s and one for each reset
+    assert [line.split(":")[0] for line in result.stdout.splitlines()] == [
+        "trial 1",
+        "trial 2",
+    ]
+
+
+def test_ctrl_c_ends_it_without_a_word(display):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "epuck_mj.view", "arena", "--seconds", "0.1"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=MODELS.parent,
+        env={**os.environ, "DISPLAY": display},
+    )
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    process.send_signal(2)
+    _, errors = process.communicate(timeout=30)
+    if "cannot open a window" in errors:
+        pytest.skip(f"no OpenGL on Xvfb: {errors}")
+    assert line.startswith("trial 1: ")
+    assert (process.returncode, errors) == (130, "")
+
+
+def test_without_glfw_one_line_says_so(monkeypatch):
+    def missing(name):
+        raise ImportError(f"no {name}")
+
+    monkeypatch.setattr(view.importlib, "import_module", missing)
+    scene = load_scene("epuck_planar", "arena")
+    robot = view.WatchedRobot(scene)
+    with (
+        pytest.raises(UserError, match="cannot open a window"),
+        view.open_window(scene.model, robot.data),
+    ):
+        pass
