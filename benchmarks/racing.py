@@ -15,12 +15,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import tyro
 
 from epuck_mj import files
 from epuck_mj.command_line import main, parse
 from epuck_mj.control import Trials
 from epuck_mj.controller import Controller
+from epuck_mj.disturbances import Disturbances
 from evolution.config import find_config, load_config
 from evolution.evaluation import BatchEngine, Race
 from evolution.experiment import Experiment
@@ -57,17 +59,23 @@ class BothWays:
         self.steps = {True: 0, False: 0}
         self.seconds = {True: 0.0, False: 0.0}
 
-    def run(self, controller: Controller, starts, race: Race | None = None) -> Trials:
+    def run(
+        self,
+        controller: Controller,
+        starts: np.ndarray,
+        race: Race | None = None,
+        disturbances: Disturbances | None = None,
+    ) -> Trials:
         """See `Engine.run`."""
         sampled = self._generation % EVERY == 0
         self._generation += 1
         if sampled:
-            self._timed(controller, starts, None)
-        return self._timed(controller, starts, race, counted=sampled)
+            self._timed(True, controller, starts, None, disturbances)
+        return self._timed(sampled, controller, starts, race, disturbances)
 
-    def _timed(self, controller, starts, race, counted: bool = True) -> Trials:
+    def _timed(self, counted: bool, controller, starts, race, disturbances) -> Trials:
         started = time.perf_counter()
-        trials = self._engine.run(controller, starts, race)
+        trials = self._engine.run(controller, starts, race, disturbances)
         if counted:
             self.seconds[race is not None] += time.perf_counter() - started
             self.steps[race is not None] += int(trials.steps.sum())

@@ -109,8 +109,12 @@ def control_step(
     wheels = command(action, task.speeds)
     reading = robot.step(wheels)
     seen = observe(reading.distance, task.sensor_range)
+    # what a step is worth is not for noisy sensors to say
+    judged = seen
+    if reading.truth is not None:
+        judged = observe(reading.truth, task.sensor_range)
     # a crash stops the calculation: its own step earns nothing
-    fitness = np.where(reading.contact, 0.0, task.step_fitness(action, seen))
+    fitness = np.where(reading.contact, 0.0, task.step_fitness(action, judged))
     return ControlStep(action, wheels, reading, seen, fitness)
 
 

@@ -1,16 +1,22 @@
-"""From what the network says to what the wheels are told."""
+"""From what the network says to what the wheels are told, and make of it."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from epuck_mj.constants import (
+    MOTOR_TICK_RATE,
     SPEED_MAX,
+    STEP_RATE_MAX,
+    STEPS_PER_REVOLUTION,
     TRACK,
     TURN_RATE_MAX,
     WHEEL_RADIUS,
     WHEEL_SPEED_MAX,
 )
+
+STEP_ANGLE = 2 * np.pi / STEPS_PER_REVOLUTION
+"""What a wheel turns by in one step of its motor [rad]."""
 
 
 @dataclass(frozen=True)
@@ -44,3 +50,35 @@ def command(action: np.ndarray, speeds: Speeds) -> np.ndarray:
     np.add(forward, turn, out=wheels[..., 0])
     np.subtract(forward, turn, out=wheels[..., 1])
     return np.clip(wheels, -WHEEL_SPEED_MAX, WHEEL_SPEED_MAX, out=wheels)
+
+
+def step_rates(command: np.ndarray) -> np.ndarray:
+    """Commands as the firmware takes them: whole steps/s within +-1000, `(...)`, int.
+
+    Args:
+        command: wheel speeds [rad/s], `(...)`.
+    """
+    rates = np.rint(np.asarray(command) / STEP_ANGLE)
+    return np.clip(rates, -STEP_RATE_MAX, STEP_RATE_MAX).astype(int)
+
+
+def actual_rates(rates: np.ndarray, tick_rate: int = MOTOR_TICK_RATE) -> np.ndarray:
+    """Speeds at which motors told `rates` really turn [steps/s], `(...)`.
+
+    A step takes a whole number of ticks, rounded down, so no motor is slower than told.
+
+    Args:
+        rates: whole steps/s, `(...)`, no more than the firmware accepts.
+        tick_rate: of the firmware's timer [1/s]; an e-puck v1's if not given.
+
+    Source: derived from e-puck-library, `e_motors.c` and `e_agenda.c`; for an e-puck2,
+    e-puck2_main-processor, `motors.c`.
+    """
+    rates = np.asarray(rates)
+    ticks = tick_rate // np.maximum(np.abs(rates), 1)
+    return np.sign(rates) * (tick_rate / ticks)
+
+
+def wheel_speeds(rates: np.ndarray) -> np.ndarray:
+    """Wheel speeds [rad/s] of motors that make `rates` [steps/s], `(...)`."""
+    return rates * STEP_ANGLE

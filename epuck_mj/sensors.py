@@ -7,6 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from epuck_mj.constants import (
+    PROXIMITY_COUNT_MAX,
+    PROXIMITY_COUNT_NOISE,
+    PROXIMITY_COUNTS,
+)
+
+_DISTANCES = np.array(list(PROXIMITY_COUNTS))
+_LOG_COUNTS = np.log(list(PROXIMITY_COUNTS.values()))
+_NOISE_DISTANCES = np.array(list(PROXIMITY_COUNT_NOISE))
+_NOISE = np.array(list(PROXIMITY_COUNT_NOISE.values()))
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -16,10 +27,64 @@ class Reading:
         distance: metres along each proximity ray from the shell, `(..., 8)`;
             negative where nothing was hit, as MuJoCo's rangefinders say it.
         contact: whether the shell touches a wall, `(...,)`, bool.
+        proximity: counts that `distance` comes from, `(..., 8)`; None of sensors that
+            measure distance itself.
+        truth: metres along the rays as they are, `(..., 8)`; None where `distance` is
+            that, or where nobody knows.
     """
 
     distance: np.ndarray
     contact: np.ndarray
+    proximity: np.ndarray | None = None
+    truth: np.ndarray | None = None
+
+
+def proximity(distance: np.ndarray, gains: np.ndarray | float = 1.0) -> np.ndarray:
+    """What sensors of real robots count, free of noise, `(..., 8)`.
+
+    Args:
+        distance: metres along each ray, `(..., 8)`; negative is "nothing hit".
+        gains: of each sensor against the mean one, `(..., 8)`.
+
+    Returns:
+        Counts, growing as things come near; 0 farther than any was measured.
+
+    Source: `PROXIMITY_COUNTS`, its logarithm linear in between.
+    """
+    counts = np.exp(np.interp(distance, _DISTANCES, _LOG_COUNTS)) * gains
+    seen = (distance >= 0) & (distance <= _DISTANCES[-1])
+    return np.where(seen, np.minimum(counts, PROXIMITY_COUNT_MAX), 0.0)
+
+
+def counted(
+    distance: np.ndarray, gains: np.ndarray | float, noise: np.ndarray
+) -> np.ndarray:
+    """Counts as a robot reports them, whole and 12 bits wide, `(..., 8)`.
+
+    Args:
+        distance: metres along each ray, `(..., 8)`; negative is "nothing hit".
+        gains: of each sensor against the mean one, `(..., 8)`.
+        noise: of each reading, in published standard deviations, `(..., 8)`.
+
+    Source: `PROXIMITY_COUNT_NOISE`, linear in between.
+    """
+    far = np.where(distance < 0, _NOISE_DISTANCES[-1], distance)
+    deviation = np.interp(far, _NOISE_DISTANCES, _NOISE)
+    counts = np.rint(proximity(distance, gains) + noise * deviation)
+    return np.clip(counts, 0, PROXIMITY_COUNT_MAX)
+
+
+def sensed_distance(counts: np.ndarray, gains: np.ndarray | float = 1.0) -> np.ndarray:
+    """Metres along each ray that counts speak of, `(..., 8)`: undoes `proximity`.
+
+    Few counts are far away: the farthest distance that was ever measured.
+
+    Args:
+        counts: of each sensor, `(..., 8)`.
+        gains: of each sensor against the mean one, `(..., 8)`.
+    """
+    logs = np.log(np.maximum(counts, 1.0) / gains)
+    return np.interp(logs, _LOG_COUNTS[::-1], _DISTANCES[::-1])
 
 
 def observe(distance: np.ndarray, sensor_range: float) -> np.ndarray:

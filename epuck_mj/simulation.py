@@ -9,8 +9,11 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from epuck_mj.model import Scene
+from epuck_mj.model import ROBOT_BODY, SHELL, Scene
 from epuck_mj.sensors import Reading
+
+SPARE_SPEED = 2.0
+"""Of wheels of robots with bodies of their own, against the actuators' limits."""
 
 
 class SimulatedRobots:
@@ -33,6 +36,7 @@ class SimulatedRobots:
         self._ctrl = self._batch.bind("ctrl")
         self._sensordata = self._batch.bind("sensordata")
         self._active = np.zeros(0, np.int32)
+        self._embodied = False
 
     def reset(self, starts: np.ndarray) -> Reading:
         """Put a robot at rest on each start `(robots, 3)`: x, y [m], yaw [rad].
@@ -63,6 +67,33 @@ class SimulatedRobots:
             stage=mujoco.mjtStage.mjSTAGE_VEL.value,
         )
         return self._reading()
+
+    def embody(self, mass: np.ndarray, friction: np.ndarray) -> None:
+        """Give the robots of the next reset bodies of their own.
+
+        Their wheels may turn faster than a firmware would ask for: larger ones do.
+
+        Args:
+            mass: of each robot against the scene's, `(robots,)`.
+            friction: of all but its shell, likewise.
+        """
+        model, n, wheels = self.scene.model, len(mass), self.scene.wheels
+        limits = self._batch.expand("actuator_ctrlrange")
+        limits[:n, wheels] = model.actuator_ctrlrange[wheels] * SPARE_SPEED
+        if not self._embodied and (mass == 1).all() and (friction == 1).all():
+            return
+        self._embodied = True
+        robot = model.body_rootid == model.body(ROBOT_BODY).id
+        tyres = robot[model.geom_bodyid]
+        tyres[model.geom(SHELL).id] = False
+        for name in ("body_mass", "body_inertia"):
+            field, own = self._batch.expand(name), getattr(model, name)[robot]
+            scale = mass.reshape(n, *[1] * own.ndim)
+            field[:n, robot] = own * scale
+        field = self._batch.expand("geom_friction")
+        field[:n, tyres] = model.geom_friction[tyres] * friction[:, None, None]
+        # what the contact solver has worked out from them
+        self._batch.set_const(np.arange(n, dtype=np.int32))
 
     def keep(self, mask: np.ndarray) -> None:
         """Go on with the active robots that `mask` `(active,)` names."""

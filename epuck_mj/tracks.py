@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from epuck_mj.control import BatchPolicy, TaskParameters, control_step
+from epuck_mj.disturbances import Disturbances
+from epuck_mj.disturbed_robots import DisturbedRobots
 from epuck_mj.sensors import observe
 from epuck_mj.simulation import SimulatedRobots
 
@@ -64,6 +66,7 @@ def record_tracks(
     policy: BatchPolicy,
     starts: np.ndarray,
     task: TaskParameters,
+    disturbances: Disturbances | None = None,
 ) -> Tracks:
     """One trial per start; a robot that crashes is not stepped again.
 
@@ -72,6 +75,7 @@ def record_tracks(
         policy: one member per start.
         starts: poses `(n, 3)`: x, y [m], yaw [rad].
         task: what a trial is.
+        disturbances: of each trial; None for ideal robots.
     """
     n = len(starts)
     tracks = Tracks(
@@ -83,12 +87,15 @@ def record_tracks(
     )
     group = np.arange(n) // robots.capacity
     for members in (group == i for i in range(group.max(initial=-1) + 1)):
-        _record(robots, policy[members], starts, task, tracks, np.flatnonzero(members))
+        mine = robots
+        if disturbances is not None:
+            mine = DisturbedRobots(robots, disturbances[members], task.control_step)
+        _record(mine, policy[members], starts, task, tracks, np.flatnonzero(members))
     return tracks
 
 
 def _record(
-    robots: SimulatedRobots,
+    robots: SimulatedRobots | DisturbedRobots,
     policy: BatchPolicy,
     starts: np.ndarray,
     task: TaskParameters,

@@ -11,7 +11,7 @@ import numpy as np
 
 from epuck_mj.starts import FreeSpace
 from evolution.evaluation import Engine, evaluate
-from evolution.experiment import Experiment, Purpose, random_generator
+from evolution.experiment import Experiment, Purpose, disturbances, random_generator
 
 HELD_OUT_SEED = 0
 """Seed of validation and test starts: no run's seed reaches their streams."""
@@ -86,6 +86,9 @@ def choose_champion(engine: Engine, experiment: Experiment) -> Champion:
     genomes, stored = candidates(experiment)
     starts = starts_for_validation(experiment.space)
     network = experiment.config.network
-    fitness = evaluate(engine, network, genomes, starts).fitness
+    # as it was evolved: robots that are disturbed alike
+    config, key = experiment.config, (HELD_OUT_SEED, Purpose.VALIDATION)
+    met = disturbances(config.noise, config.randomise, config.steps, len(starts), *key)
+    fitness = evaluate(engine, network, genomes, starts, disturbances=met).fitness
     best = int(fitness.argmax())
     return Champion(genomes[best], float(stored[best]), float(fitness[best]))

@@ -14,6 +14,7 @@ from pydantic import (
     StrictFloat,
     StrictInt,
     ValidationError,
+    model_validator,
 )
 
 from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
@@ -54,6 +55,10 @@ OptimizerConfig = Annotated[
 ]
 
 
+NoiseLevel = Literal["none", "calibrated", "strong"]
+"""Keys of `epuck_mj.disturbances.NOISE`."""
+
+
 class ExperimentConfig(BaseModel):
     """One run of evolution, but for how it is carried out (threads, engine, output)."""
 
@@ -82,6 +87,12 @@ class ExperimentConfig(BaseModel):
     sensor_range: StrictFloat = Field(
         PROXIMITY_RANGE, gt=0, description="range of the proximity sensors [m]"
     )
+    noise: NoiseLevel = Field(
+        "none", description="none: ideal sensors and motors; others: as real ones"
+    )
+    randomise: StrictBool = Field(
+        False, description="another robot in each trial; needs noise"
+    )
     start_clearance: StrictFloat = Field(
         START_CLEARANCE,
         gt=0,
@@ -99,6 +110,13 @@ class ExperimentConfig(BaseModel):
         5.0, gt=0, le=1e6, description="first weights are uniform within +- this"
     )
     optimizer: OptimizerConfig
+
+    @model_validator(mode="after")
+    def _of_real_robots(self) -> Self:
+        """Only real robots differ from each other."""
+        if self.randomise and self.noise == "none":
+            raise ValueError("randomise needs noise: calibrated or strong, got none")
+        return self
 
     @property
     def task(self) -> TaskParameters:
@@ -132,6 +150,19 @@ class ExperimentConfig(BaseModel):
         return yaml.safe_dump(self.model_dump(), sort_keys=False)
 
     @classmethod
+    def from_yaml(cls, text: str, where: str) -> Self:
+        """The config that `to_yaml` wrote; keys it did not know have their defaults.
+
+        Raises:
+            UserError: beginning with `where`, if it is anything else.
+        """
+        try:
+            return cls.parsed(yaml.safe_load(text), where)
+        except yaml.YAMLError as error:
+            reason = " ".join(str(error).split())
+            raise UserError(f"{where} is not YAML: {reason}") from None
+
+    @classmethod
     def parsed(cls, fields: Any, where: str) -> Self:
         """The config that keys and values make.
 
@@ -148,7 +179,7 @@ def shipped_experiments() -> dict[str, Path]:
     """Files of the shipped experiments by name; studies are kept beside them."""
     return {
         path.stem: path
-        for path in sorted(CONFIGS.glob("*.yaml"))
+        for path in sorted(CONFIGS.glob("*.yaml"), key=lambda path: path.stem)
         if "optimizer" in read_mapping(path)
     }
 

@@ -1,24 +1,22 @@
 """Held-out evaluation: `python -m evolution.evaluate PATH... [options]`."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import tyro
 
-from epuck_mj import controller, files
+from epuck_mj import files
 from epuck_mj.command_line import check_threads, main, parse
-from epuck_mj.control import Policy, TaskParameters
 from epuck_mj.errors import UserError
 from epuck_mj.model import load_scene
-from epuck_mj.tasks import START_CLEARANCE
-from epuck_mj.wall_follower import WallFollower
-from evolution.champion import N_TEST
-from evolution.config import load_config
+from evolution.champion import HELD_OUT_SEED, N_TEST
+from evolution.config import NoiseLevel
+from evolution.experiment import Purpose, disturbances
 from evolution.held_out import HeldOut, Judge
+from evolution.named_policies import named_policies
 from evolution.results import PLANAR_ROBOT, WHEELED_ROBOT
-from evolution.run_directory import RunDirectory
 from evolution.study_data import YARDSTICK
 
 MODULE = "evolution.evaluate"
@@ -32,32 +30,27 @@ class Options:
     Attributes:
         paths: run or study directories, controller files, or wall-follower, the one
             written by hand.
+        generations: instead of champions, the best individuals of these generations of
+            runs: numbers from 0 on and last, with commas in between.
         starts: how many test starts: the first of always the same.
         robot: robot to test on; the one it evolved on and the one on wheels if not
             given.
         arena: arena to test in; the one it evolved in if not given.
+        noise: none for ideal sensors and motors; calibrated or strong for real ones.
+        randomise: another robot in each trial; needs noise.
         threads: threads that step the robots; 0 is one per core. Changes no result.
         json: also write everything to this file.
     """
 
     paths: tyro.conf.Positional[tuple[str, ...]]
+    generations: str | None = None
     starts: int = N_TEST
     robot: str | None = None
     arena: str | None = None
+    noise: NoiseLevel = "none"
+    randomise: bool = False
     threads: int = 0
     json: Path | None = None
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A policy, and where it comes from."""
-
-    name: str
-    policy: Policy
-    task: TaskParameters
-    robot: str = "epuck_planar"
-    arena: str = "arena"
-    start_clearance: float = START_CLEARANCE
 
 
 def evaluate(argv: Sequence[str]) -> int:
@@ -74,7 +67,13 @@ def evaluate(argv: Sequence[str]) -> int:
         raise UserError(
             f"expected run or study directories, controller files, or {YARDSTICK}"
         )
-    candidates = [found for path in options.paths for found in _candidates(path)]
+    candidates = [
+        found
+        for path in options.paths
+        for found in named_policies(path, options.generations)
+    ]
+    if options.randomise and options.noise == "none":
+        raise UserError("--randomise needs --noise calibrated or strong, got none")
     judges: dict[tuple, Judge] = {}
     tests = []
     for candidate in candidates:
@@ -88,62 +87,29 @@ def evaluate(argv: Sequence[str]) -> int:
                 judges[key] = Judge(
                     scene, candidate.task, candidate.start_clearance, options.threads
                 )
-            test = judges[key].test(candidate.policy, options.starts)
+            met = disturbances(
+                options.noise,
+                options.randomise,
+                candidate.task.steps,
+                options.starts,
+                HELD_OUT_SEED,
+                Purpose.TEST,
+            )
+            test = judges[key].test(candidate.policy, options.starts, met)
             print(f"{candidate.name}, {Path(robot).name} in {Path(arena).name}")
             print(_described(test, candidate.task.steps), flush=True)
-            where = {"name": candidate.name, "robot": robot, "arena": arena}
+            where = {
+                "name": candidate.name,
+                "robot": robot,
+                "arena": arena,
+                "noise": options.noise,
+                "randomise": options.randomise,
+            }
             tests.append(where | asdict(test))
     if options.json is not None:
         with files.writing(options.json.parent):
             files.write_text(options.json, json.dumps(tests, indent=1) + "\n")
     return 0
-
-
-def _candidates(path: str) -> Iterator[Candidate]:
-    """The champions at a path.
-
-    Raises:
-        UserError: if there are none.
-    """
-    if path == YARDSTICK:
-        yield Candidate(YARDSTICK, WallFollower(), TaskParameters())
-        return
-    place = Path(path)
-    champions = [place]
-    if not files.is_file(place):
-        # a run's own, or those of all the runs of a study
-        champions = sorted(place.glob("champion.json")) or sorted(
-            place.glob("*/seed-*/champion.json"),
-            key=lambda p: (p.parent.parent.name, len(p.parent.name), p.parent.name),
-        )
-        if not champions:
-            raise UserError(
-                f"no champion in '{path}': expected the directory of a finished run, "
-                "or of a study with one"
-            )
-    for champion in champions:
-        file = controller.load(champion)
-        yield Candidate(
-            str(champion.parent if place.is_dir() else champion),
-            file.controller,
-            TaskParameters.from_dict(file.task),
-            _scene(file.scene, "robot", champion),
-            _scene(file.scene, "arena", champion),
-            _start_clearance(champion.parent) if place.is_dir() else START_CLEARANCE,
-        )
-
-
-def _start_clearance(run: Path) -> float:
-    """The one that a run's champion was tested with; its file does not say."""
-    config = RunDirectory(run).config
-    return load_config(config).start_clearance if config.is_file() else START_CLEARANCE
-
-
-def _scene(fields: dict, key: str, path: Path) -> str:
-    value = fields.get(key)
-    if not isinstance(value, str):
-        raise UserError(f"'{path}' does not say which {key} it is for")
-    return value
 
 
 def _described(test: HeldOut, steps: int) -> str:

@@ -14,8 +14,10 @@ from typing import Protocol
 
 import numpy as np
 
-from epuck_mj.control import TaskParameters, Trials, run_trials
+from epuck_mj.control import Robots, TaskParameters, Trials, run_trials
 from epuck_mj.controller import Controller, Network
+from epuck_mj.disturbances import Disturbances
+from epuck_mj.disturbed_robots import DisturbedRobots
 from epuck_mj.model import Scene
 from epuck_mj.simulation import SimulatedRobots
 from epuck_mj.tasks import FollowWalls, environment
@@ -80,11 +82,16 @@ class Engine(Protocol):
     """Runs one trial per member of a batch of controllers."""
 
     def run(
-        self, controller: Controller, starts: np.ndarray, race: Race | None = None
+        self,
+        controller: Controller,
+        starts: np.ndarray,
+        race: Race | None = None,
+        disturbances: Disturbances | None = None,
     ) -> Trials:
         """Outcome of `(n,)` trials of `(n,)` controllers on `(n, 3)` starts.
 
         With a `race`, trials of individuals that can only lose may be broken off.
+        Without `disturbances`, robots are ideal.
         """
         ...
 
@@ -98,7 +105,11 @@ class BatchEngine:
         self._robots = SimulatedRobots(scene, CAPACITY, threads)
 
     def run(
-        self, controller: Controller, starts: np.ndarray, race: Race | None = None
+        self,
+        controller: Controller,
+        starts: np.ndarray,
+        race: Race | None = None,
+        disturbances: Disturbances | None = None,
     ) -> Trials:
         """See `Engine.run`."""
         trials = 1 if race is None else race.trials
@@ -107,7 +118,7 @@ class BatchEngine:
             trials, race = 1, None
         parts = [
             run_trials(
-                self._robots,
+                self._in(None if disturbances is None else disturbances[chunk]),
                 controller[chunk],
                 starts[chunk],
                 self._task,
@@ -116,6 +127,12 @@ class BatchEngine:
             for chunk in chunks(len(starts), trials, self._robots.capacity)
         ]
         return joined(parts)
+
+    def _in(self, disturbances: Disturbances | None) -> Robots:
+        """The robots, with those around them."""
+        if disturbances is None:
+            return self._robots
+        return DisturbedRobots(self._robots, disturbances, self._task.control_step)
 
 
 class DmControlEngine:
@@ -127,9 +144,19 @@ class DmControlEngine:
         self._task = task
 
     def run(
-        self, controller: Controller, starts: np.ndarray, race: Race | None = None
+        self,
+        controller: Controller,
+        starts: np.ndarray,
+        race: Race | None = None,
+        disturbances: Disturbances | None = None,
     ) -> Trials:
-        """See `Engine.run`; every trial is lived to its end."""
+        """See `Engine.run`; every trial is lived to its end, by an ideal robot.
+
+        Raises:
+            ValueError: if there are disturbances.
+        """
+        if disturbances is not None:
+            raise ValueError("expected no disturbances: dm_control has ideal robots")
         task = FollowWalls(self._scene, self._task, starts=starts)
         env = environment(self._scene, task)
         fitness = np.zeros(len(starts))
@@ -151,6 +178,7 @@ def evaluate(
     genomes: np.ndarray,
     starts: np.ndarray,
     to_beat: np.ndarray | None = None,
+    disturbances: Disturbances | None = None,
 ) -> Evaluation:
     """All individuals on all starts.
 
@@ -161,11 +189,14 @@ def evaluate(
         starts: poses `(trials, 3)`, x, y [m], yaw [rad]: the same for everybody.
         to_beat: fitness `(individuals,)` below which nobody cares how far below;
             None if every fitness matters.
+        disturbances: of the trials, the same for everybody; None for ideal robots.
     """
     shape = (len(genomes), len(starts))
     controller = network.decode(np.repeat(genomes, len(starts), axis=0))
     race = None if to_beat is None else Race(to_beat, len(starts))
-    trials = engine.run(controller, np.tile(starts, (len(genomes), 1)), race)
+    everybody = None if disturbances is None else disturbances.tiled(len(genomes))
+    everywhere = np.tile(starts, (len(genomes), 1))
+    trials = engine.run(controller, everywhere, race, everybody)
     return Evaluation(
         trials.fitness.reshape(shape),
         trials.steps.reshape(shape),

@@ -10,6 +10,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from epuck_mj.disturbances import BOOK, NOISE, RANGES, Disturbances, draw
 from epuck_mj.errors import UserError
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.starts import FreeSpace
@@ -27,6 +28,7 @@ class Purpose(IntEnum):
     STARTS = 1
     VALIDATION = 2
     TEST = 3
+    DISTURBANCES = 4
 
 
 def random_generator(seed: int, *key: int) -> np.random.Generator:
@@ -128,7 +130,14 @@ class Experiment:
         starts = self.space.sample(rng, config.trials)
         genomes = self.optimizer.ask()
         to_beat = self.optimizer.to_beat() if self.racing else None
-        evaluation = evaluate(self.engine, config.network, genomes, starts, to_beat)
+        evaluation = evaluate(
+            self.engine,
+            config.network,
+            genomes,
+            starts,
+            to_beat,
+            self._disturbances(generation),
+        )
         self.optimizer.tell(evaluation.fitness)
         fitness = self.optimizer.fitness
         record = Record(
@@ -143,6 +152,18 @@ class Experiment:
         self.records.append(record)
         self.best_genomes.append(self.optimizer.population[fitness.argmax()].copy())
         return record
+
+    def _disturbances(self, generation: int) -> Disturbances | None:
+        """Of the trials of a generation, the same for every individual."""
+        config, key = self.config, (Purpose.STARTS, generation)
+        return disturbances(
+            config.noise,
+            config.randomise,
+            config.steps,
+            config.trials,
+            config.seed,
+            *key,
+        )
 
     def state(self) -> dict[str, np.ndarray]:
         """Everything that the next generations depend on, and what has been so far."""
@@ -204,6 +225,26 @@ def _optimizer(config: ExperimentConfig) -> Optimizer:
         raise UserError(str(error)) from None
 
 
+def disturbances(
+    noise: str, randomise: bool, steps: int, n: int, seed: int, *key: int
+) -> Disturbances | None:
+    """What `n` trials meet, if anything.
+
+    Args:
+        noise: name of a level.
+        randomise: whether robots differ.
+        steps: control steps of a trial.
+        n: number of trials.
+        seed: of all randomness.
+        key: what the trials are for, and what else they depend on.
+    """
+    level = NOISE[noise]
+    if level is None:
+        return None
+    rng = random_generator(seed, Purpose.DISTURBANCES, *key)
+    return draw(rng, n, steps, level, RANGES if randomise else BOOK)
+
+
 def make_engine(
     name: str, scene: Scene, config: ExperimentConfig, threads: int
 ) -> Engine:
@@ -215,5 +256,10 @@ def make_engine(
     if name == "batch":
         return BatchEngine(scene, config.task, threads)
     if name == "dm_control":
+        if config.noise != "none":
+            raise UserError(
+                f"engine dm_control knows ideal robots only, got noise {config.noise}: "
+                "expected engine batch"
+            )
         return DmControlEngine(scene, config.task)
     raise UserError(f"unknown engine '{name}'; available: {', '.join(ENGINES)}")

@@ -12,6 +12,7 @@ import numpy as np
 from epuck_mj.behaviour_classes import class_shares
 from epuck_mj.clearance import ClearanceProbe
 from epuck_mj.control import Policy, TaskParameters
+from epuck_mj.disturbances import Disturbances
 from epuck_mj.metrics import behaviour
 from epuck_mj.model import Scene
 from epuck_mj.simulation import SimulatedRobots
@@ -105,10 +106,22 @@ class Judge:
         """The first of the test starts of this scene, `(n, 3)`."""
         return starts_for_test(self._space, n)
 
-    def test(self, policy: Policy, n: int = N_TEST) -> HeldOut:
-        """What the first `n` test starts say of a policy, one for all of them."""
+    def test(
+        self,
+        policy: Policy,
+        n: int = N_TEST,
+        disturbances: Disturbances | None = None,
+    ) -> HeldOut:
+        """What the first `n` test starts say of a policy, one for all of them.
+
+        Args:
+            policy: to test.
+            n: number of starts.
+            disturbances: of the `n` trials; None for ideal robots.
+        """
         robots = SimulatedRobots(self.scene, min(CAPACITY, n), self._threads)
-        tracks = record_tracks(robots, Everybody(policy), self.starts(n), self._task)
+        everybody, starts = Everybody(policy), self.starts(n)
+        tracks = record_tracks(robots, everybody, starts, self._task, disturbances)
         clearance = self._probe.measure(tracks.pose)
         did = behaviour(tracks, clearance, self._loops, self._task)
         fitness = tracks.trial_fitness

@@ -64,6 +64,11 @@ BASELINES = {
     },
 }
 SHIPPED = PAPERS | BASELINES
+ON_REAL_ROBOTS = {
+    "de-best-calibrated": {"noise": "calibrated"},
+    "de-best-randomised": {"noise": "calibrated", "randomise": True},
+}
+"""DE/best again, under disturbances."""
 every_experiment = pytest.mark.parametrize("name", SHIPPED)
 COMMON = {
     "seed": 1,
@@ -77,6 +82,8 @@ COMMON = {
     "v_max": SPEED_MAX,
     "w_max": TURN_RATE_MAX,
     "sensor_range": 0.04,
+    "noise": "none",
+    "randomise": False,
     "start_clearance": 0.01,
     "hidden": 4,
     "biases": False,
@@ -124,7 +131,13 @@ DE = {
 
 
 def test_exactly_these_experiments_are_shipped():
-    assert list(shipped_experiments()) == sorted(SHIPPED)
+    assert list(shipped_experiments()) == sorted([*SHIPPED, *ON_REAL_ROBOTS])
+
+
+@pytest.mark.parametrize("name", ON_REAL_ROBOTS)
+def test_experiments_on_real_robots_differ_in_nothing_else(name):
+    config = load_config(find_config(name)).model_dump()
+    assert config == {**COMMON, "optimizer": SHIPPED["de-best"], **ON_REAL_ROBOTS[name]}
 
 
 @every_experiment
@@ -347,7 +360,7 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path):
 
 def test_unknown_experiment_is_refused_with_the_shipped_ones(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    available = ", ".join(sorted(SHIPPED))
+    available = ", ".join(sorted([*SHIPPED, *ON_REAL_ROBOTS]))
     with pytest.raises(UserError, match=rf"no experiment 'de'.* one of {available}$"):
         find_config("de")
     with pytest.raises(UserError, match="no experiment"):

@@ -66,8 +66,8 @@ class Watched:
         self.engine = engine
         self.calls = []
 
-    def run(self, controller, starts, race=None):
-        trials = self.engine.run(controller, starts, race)
+    def run(self, controller, starts, race=None, disturbances=None):
+        trials = self.engine.run(controller, starts, race, disturbances)
         self.calls.append((controller, starts.copy(), trials))
         return trials
 
@@ -122,7 +122,7 @@ def test_streams_depend_on_each_part_of_their_key():
     draws = [random_generator(*key).random(4).tolist() for key in keys]
     assert draws[0] == random_generator(1).random(4).tolist()
     assert all(a != b for i, a in enumerate(draws) for b in draws[:i])
-    assert len(set(Purpose)) == len(Purpose.__members__) == 4
+    assert len(set(Purpose)) == len(Purpose.__members__) == 5
 
 
 # records

@@ -9,6 +9,7 @@ import numpy as np
 
 from epuck_mj.control import TaskParameters, Trials
 from epuck_mj.controller import Controller
+from epuck_mj.disturbances import Disturbances
 from epuck_mj.model import load_scene
 from evolution.cluster.connection import Cluster, ClusterLost
 from evolution.cluster.world import World, world_of
@@ -59,7 +60,11 @@ class ClusterEngine:
         return "cluster"
 
     def run(
-        self, controller: Controller, starts: np.ndarray, race: Race | None = None
+        self,
+        controller: Controller,
+        starts: np.ndarray,
+        race: Race | None = None,
+        disturbances: Disturbances | None = None,
     ) -> Trials:
         """See `Engine.run`.
 
@@ -79,6 +84,7 @@ class ClusterEngine:
                 controller[chunk],
                 starts[chunk],
                 None if race is None else race[chunk],
+                None if disturbances is None else disturbances[chunk],
             )
             for chunk in chunks(len(starts), whole, most)
         ]
@@ -91,6 +97,7 @@ def _trials(
     controller: Controller,
     starts: np.ndarray,
     race: Race | None,
+    disturbances: Disturbances | None,
 ) -> Trials:
     """On a worker: `Engine.run` of a chunk."""
     # a thread's own: an engine runs one batch at a time
@@ -101,7 +108,7 @@ def _trials(
             engines.clear()
         scene = load_scene(world.robot, world.arena, world.control_step)
         engines[world, task] = BatchEngine(scene, task, threads=1)
-    return engines[world, task].run(controller, starts, race)
+    return engines[world, task].run(controller, starts, race, disturbances)
 
 
 _kept = threading.local()

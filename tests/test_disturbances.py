@@ -1,0 +1,258 @@
+"""Disturbances: robots as real ones, the same for everybody, the same at any speed."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from epuck_mj.constants import STEP_RATE_MAX, TRACK, WHEEL_RADIUS
+from epuck_mj.control import TaskParameters
+from epuck_mj.controller import Network
+from epuck_mj.disturbances import BOOK, NOISE, RANGES, Disturbances, Noise, draw
+from epuck_mj.disturbed_robots import DisturbedRobots
+from epuck_mj.errors import UserError
+from epuck_mj.model import ROBOT_BODY, load_scene
+from epuck_mj.motors import wheel_speeds
+from epuck_mj.sensors import proximity
+from epuck_mj.simulation import SimulatedRobots
+from evolution import evaluation
+from evolution.config import ExperimentConfig
+from evolution.evaluation import BatchEngine, DmControlEngine, evaluate
+from evolution.experiment import Experiment, make_engine
+
+TASK = TaskParameters(steps=40)
+STEPS = TASK.steps
+QUIET = Noise(counts=0.0, wheels=0.0, age=0.0)
+STARTS = np.array([[0.0, 0.0, 0.3], [0.42, 0.1, 1.5], [-0.2, -0.43, 3.0]])
+FULL = wheel_speeds(np.array([STEP_RATE_MAX, STEP_RATE_MAX]))
+
+
+@pytest.fixture(scope="module", params=["epuck", "epuck_planar"])
+def scene(request):
+    return load_scene(request.param, "arena", TASK.control_step)
+
+
+def drawn(n, noise=NOISE["calibrated"], ranges=RANGES, seed=0, **changes):
+    assert noise is not None
+    found = draw(np.random.default_rng(seed), n, STEPS, noise, ranges)
+    return dataclasses.replace(found, **changes)
+
+
+def genomes(n, seed=1):
+    return np.random.default_rng(seed).uniform(-5, 5, (n, Network().n_genes))
+
+
+def robots_on(scene, starts, disturbances) -> DisturbedRobots:
+    robots = SimulatedRobots(scene, len(starts), 1)
+    return DisturbedRobots(robots, disturbances, TASK.control_step)
+
+
+def driven(scene, starts, disturbances, command, steps=10) -> np.ndarray:
+    """Poses `(steps + 1, n, 3)` under one command for all."""
+    robots = robots_on(scene, starts, disturbances)
+    robots.reset(starts)
+    poses = [robots.poses()]
+    for _ in range(steps):
+        robots.step(np.tile(command, (len(starts), 1)))
+        poses.append(robots.poses())
+    return np.array(poses)
+
+
+def test_draws_stay_in_their_ranges_and_come_from_their_seed():
+    many = drawn(3000)
+    for name, (low, high) in {
+        "gains": RANGES.gain,
+        "mass": RANGES.mass,
+        "friction": RANGES.friction,
+        "latency": RANGES.latency,
+    }.items():
+        values = getattr(many, name)
+        assert low <= values.min() < values.max() <= high
+    radius, track = many.wheel_gains * WHEEL_RADIUS, TRACK / many.turn_gain
+    assert RANGES.wheel_radius[0] <= radius.min() < radius.max()
+    assert radius.max() <= RANGES.wheel_radius[1]
+    assert RANGES.track[0] <= track.min() < track.max() <= RANGES.track[1]
+    assert abs(many.count_noise.std() - 1) < 0.01
+    assert abs(many.wheel_noise.std() - 0.03) < 0.001
+    # weaker and stronger sensors are as likely
+    assert abs(np.median(np.log(many.gains)) - np.log(RANGES.gain).mean()) < 0.02
+    for field in dataclasses.fields(Disturbances):
+        again, other = drawn(3000), drawn(3000, seed=1)
+        value = getattr(many, field.name)
+        np.testing.assert_array_equal(getattr(again, field.name), value)
+        assert field.name == "of" or (getattr(other, field.name) != value).any()
+
+
+def test_the_book_has_one_robot():
+    found = drawn(5, ranges=BOOK)
+    for name in ("gains", "wheel_gains", "turn_gain", "mass", "friction"):
+        np.testing.assert_allclose(getattr(found, name), 1, rtol=1e-12)
+    assert not found.latency.any()
+
+
+def test_arrays_that_do_not_belong_together_are_refused():
+    with pytest.raises(ValueError, match="expected gains"):
+        drawn(3, gains=np.ones((3, 7)))
+
+
+def test_without_disturbances_a_robot_counts_and_steps_and_that_is_all(scene):
+    quiet = drawn(len(STARTS), QUIET, BOOK)
+    robots, ideal = robots_on(scene, STARTS, quiet), SimulatedRobots(scene, 3, 1)
+    seen, true = robots.reset(STARTS), ideal.reset(STARTS)
+    np.testing.assert_array_equal(seen.truth, true.distance)
+    assert seen.proximity is not None
+    np.testing.assert_array_equal(seen.proximity, np.rint(proximity(true.distance)))
+    near = (true.distance >= 0) & (true.distance < 0.04)
+    assert near.any()
+    # half a count, where they are fewest, is less than a quarter of a millimetre
+    error = np.abs(seen.distance - true.distance)[near]
+    assert error.max() < 2.5e-4
+    # 1000 steps/s are what the motors can do; 526 is the nearest they make of 510
+    for command, speed in ((FULL, 1000), (0.51 * FULL, 10_000 / 19)):
+        poses = driven(scene, STARTS[:1], quiet[:1], command)
+        way = np.linalg.norm(poses[-1, 0, :2] - poses[2, 0, :2])
+        expected = 0.8 * WHEEL_RADIUS * wheel_speeds(np.array(speed))
+        np.testing.assert_allclose(way, expected, rtol=0.01)
+
+
+def test_latency_is_whole_control_steps(scene):
+    late = drawn(1, QUIET, BOOK, latency=np.array([3]))
+    poses = driven(scene, STARTS[:1], late, FULL)
+    way = np.linalg.norm(np.diff(poses[:, 0, :2], axis=0), axis=1)
+    assert way[:3].max() < 1e-4
+    assert way[4:].min() > 0.01
+
+
+def test_wheels_and_track_change_the_way(scene):
+    plain = driven(scene, STARTS[:1], drawn(1, QUIET, BOOK), FULL)
+    larger = drawn(1, QUIET, BOOK, wheel_gains=np.full((1, 2), 1.05))
+    way, longer = (
+        np.linalg.norm(poses[-1, 0, :2] - poses[0, 0, :2])
+        for poses in (plain, driven(scene, STARTS[:1], larger, FULL))
+    )
+    np.testing.assert_allclose(longer / way, 1.05, rtol=0.005)
+    uneven = drawn(1, QUIET, BOOK, wheel_gains=np.array([[1.0, 0.9]]))
+    # the weaker right wheel turns the robot right
+    assert driven(scene, STARTS[:1], uneven, FULL)[-1, 0, 2] < 0.2
+    spin = FULL * [0.2, -0.2]
+    wider = drawn(1, QUIET, BOOK, turn_gain=np.array([0.8]))
+    turn, less = (
+        poses[-1, 0, 2] - poses[0, 0, 2]
+        for poses in (
+            driven(scene, STARTS[:1], drawn(1, QUIET, BOOK), spin),
+            driven(scene, STARTS[:1], wider, spin),
+        )
+    )
+    np.testing.assert_allclose(less / turn, 0.8, rtol=0.02)
+
+
+def test_readings_have_an_age(scene):
+    """A robot that nears a wall believes itself where it was."""
+    toward = np.array([[0.4, 0.0, 0.0]])
+    old = drawn(1, QUIET, BOOK, age=np.full((1, 8), 0.05))
+    robots = robots_on(scene, toward, old)
+    before = robots.reset(toward)
+    after = robots.step(FULL[None] / 2)
+    assert before.truth is not None
+    assert after.truth is not None
+    expected = (before.truth[0, 0] + after.truth[0, 0]) / 2
+    np.testing.assert_allclose(after.distance[0, 0], expected, atol=3e-4)
+
+
+def test_bodies_are_heavier_and_slide():
+    scene = load_scene("epuck", "arena", TASK.control_step)
+    robots = SimulatedRobots(scene, 2, 1)
+    robots.embody(np.array([1.0, 2.0]), np.array([1.0, 0.5]))
+    model = scene.model
+    body, wheel = model.body(ROBOT_BODY).id, model.geom("wheel_left").id
+    mass, friction = (
+        robots._batch.expand(name) for name in ("body_mass", "geom_friction")
+    )
+    np.testing.assert_allclose(mass[:, body], model.body_mass[body] * np.array([1, 2]))
+    np.testing.assert_allclose(friction[:, wheel, 0], [0.9, 0.45])
+    shell = model.geom("shell").id
+    np.testing.assert_allclose(friction[:, shell], [model.geom_friction[shell]] * 2)
+    # and the next robots have their own again
+    robots.embody(np.ones(2), np.ones(2))
+    np.testing.assert_array_equal(mass, [model.body_mass] * 2)
+
+
+@pytest.mark.parametrize("ranges", [BOOK, RANGES], ids=["book", "randomised"])
+def test_threads_chunks_and_company_change_nothing(scene, ranges, monkeypatch):
+    met, population = drawn(3, ranges=ranges), genomes(7)
+
+    def trials(threads):
+        engine = BatchEngine(scene, TASK, threads)
+        return evaluate(
+            engine, Network(), population, STARTS, disturbances=met
+        ).trial_fitness
+
+    expected = trials(1)
+    np.testing.assert_array_equal(trials(2), expected)
+    # chunks that break individuals up
+    monkeypatch.setattr(evaluation, "CAPACITY", 4)
+    np.testing.assert_array_equal(trials(1), expected)
+    alone = evaluate(
+        BatchEngine(scene, TASK, 1), Network(), population[4:5], STARTS, None, met
+    )
+    np.testing.assert_array_equal(alone.trial_fitness, expected[4:5])
+
+
+def test_fitness_is_judged_by_the_truth(scene):
+    """Sensors that see walls everywhere earn nothing by it."""
+    blind = drawn(1, QUIET, BOOK, gains=np.full((1, 8), 1e3))
+    middle = np.zeros((1, 3))
+    engine = BatchEngine(scene, TASK, 1)
+    found = evaluate(engine, Network(), genomes(5), middle, disturbances=blind)
+    # what lies within the range of a wall at last, and no more
+    ideal = evaluate(engine, Network(), genomes(5), middle)
+    assert found.fitness.max() <= max(5.0, ideal.fitness.max())
+
+
+CONFIG = ExperimentConfig.from_yaml(
+    "{noise: calibrated, randomise: true, evaluations: 60, steps: 25, trials: 2, "
+    "optimizer: {algorithm: differential_evolution, strategy: best, "
+    "population: 12, scale: 0.8, crossover: 0.9}}",
+    "test",
+)
+
+
+def histories(config, **settings):
+    experiment = Experiment(config, threads=1, **settings)
+    steps = sum(record.control_steps for record in experiment.run())
+    return experiment.history(), steps
+
+
+def test_racing_and_seed_under_noise():
+    raced, fewer = histories(CONFIG)
+    lived, all_of_them = histories(CONFIG, racing=False)
+    assert raced == lived
+    assert fewer < all_of_them
+    for change in ({"seed": 2}, {"noise": "strong"}, {"randomise": False}):
+        changed = CONFIG.model_copy(update=change)
+        assert histories(changed)[0] != raced
+
+
+def test_noise_of_generations_differs():
+    first, second = (
+        draw(np.random.default_rng(seed), 2, 25, NOISE["strong"] or QUIET)
+        for seed in (1, 2)
+    )
+    assert not np.array_equal(first.count_noise, second.count_noise)
+
+
+def test_what_makes_no_sense_is_refused():
+    with pytest.raises(UserError, match=r"randomise needs noise"):
+        ExperimentConfig.from_yaml(
+            "{randomise: true, optimizer: {algorithm: random_search}}", "test"
+        )
+    scene = load_scene("epuck_planar", "arena")
+    with pytest.raises(UserError, match=r"ideal robots only.*calibrated"):
+        make_engine("dm_control", scene, CONFIG, 1)
+    with pytest.raises(ValueError, match="no disturbances"):
+        DmControlEngine(scene, TASK).run(
+            Network().decode(genomes(1)), STARTS[:1], None, drawn(1)
+        )
+    robots = robots_on(scene, STARTS, drawn(2))
+    with pytest.raises(ValueError, match="expected 2 starts, got 3"):
+        robots.reset(STARTS)
