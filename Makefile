@@ -3,6 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 RUN := runs/de-best-seed-1
+CHAMPION := results/paper/de-best/seed-1
 
 .PHONY: run test bench convergence racing overhead results figures clean
 
@@ -35,10 +36,14 @@ overhead: $(INSTALLED)
 results: $(INSTALLED)
 	$(BIN)/python -m benchmarks.publish
 
-# the README's picture in 3D, which needs EGL or OSMesa; results draws the others
+# all pictures; the first needs EGL or OSMesa, the second a Vulkan driver
 figures: $(INSTALLED)
-	$(BIN)/python -m epuck_mj.render results/paper/de-best/seed-1/champion.json \
-	  --output docs/champion.png
+	$(BIN)/python -m evolution.replay $(CHAMPION) --image docs/champion.png
+	$(BIN)/python -m evolution.replay $(CHAMPION) --generations 0,10,50,last \
+	  --save runs/generations.rrd
+	$(BIN)/python -m benchmarks.viewer_picture runs/generations.rrd \
+	  --output docs/replay.png --size 1400 875
+	$(BIN)/python -m evolution.report results/paper --output results/report-paper
 
 $(INSTALLED): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv

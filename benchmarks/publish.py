@@ -69,7 +69,14 @@ def ship(source: Path, target: Path) -> None:
 
 
 def _kept(run: RunDirectory) -> list[Path]:
-    return [run.config, run.history, run.champion, run.timing, run.provenance]
+    return [
+        run.config,
+        run.history,
+        run.best_individuals,
+        run.champion,
+        run.timing,
+        run.provenance,
+    ]
 
 
 def with_tables(text: str, results: Path) -> str:
