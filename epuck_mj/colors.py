@@ -7,6 +7,9 @@ ORANGE, SKY, GREEN = (230, 159, 0), (86, 180, 233), (0, 158, 115)
 YELLOW, BLUE, VERMILION = (240, 228, 66), (0, 114, 178), (213, 94, 0)
 PURPLE = (204, 121, 167)
 
+TRIALS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, YELLOW)
+"""Colours that tell trials in one picture apart, in their order."""
+
 LOW_FITNESS, HIGH_FITNESS = YELLOW, BLUE
 """Colours of a path, from step fitness 0 to 1."""
 

@@ -36,9 +36,9 @@ def write_text(path: Path, content: str) -> None:
 
 
 def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
-    """Replace `path` by an .npz of `arrays`."""
+    """Replace `path` by an .npz of `arrays`; equal arrays make equal files."""
     buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **arrays)
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
     write_bytes(path, buffer.getvalue())
 
 
@@ -46,6 +46,14 @@ def is_file(path: Path) -> bool:
     """Whether a file is there; False as well for what cannot be a file's name."""
     try:
         return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def is_directory(path: Path) -> bool:
+    """Whether a directory is there; False as well for what cannot be one's name."""
+    try:
+        return path.is_dir()
     except (OSError, ValueError):
         return False
 
@@ -86,7 +94,8 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         content = path.read_bytes()
     except OSError as error:
         raise UserError(f"cannot read '{path}': {error.strerror}") from None
-    if not content.startswith(b"PK"):
+    # numpy takes anything else for a pickle
+    if not content.startswith((b"PK\x03\x04", b"PK\x05\x06")):
         raise UserError(f"cannot read '{path}': expected an .npz archive")
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as file:

@@ -1,35 +1,24 @@
-"""A picture of a controller's trial in 3D: `python -m epuck_mj.render champion.json`.
+"""Pictures in 3D, drawn by MuJoCo without a window, with EGL or OSMesa.
 
-Drawn by MuJoCo without a window, with EGL or OSMesa. The package switches MuJoCo's own
-choice between them off, so the context is made here and nowhere else.
+The package switches MuJoCo's own choice between them off, so the context is made here
+and nowhere else.
 """
 
 import copy
 import importlib
-import io
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from ctypes.util import find_library
-from dataclasses import dataclass, replace
-from pathlib import Path
 
 import mujoco
 import numpy as np
-import tyro
-from matplotlib.image import imsave
 
-from epuck_mj.colors import HIGH_FITNESS, LOW_FITNESS, blend
-from epuck_mj.command_line import main, parse
-from epuck_mj.control import TaskParameters
-from epuck_mj.controller import load
+from epuck_mj.colors import HIGH_FITNESS, LOW_FITNESS, TRIALS, blend
 from epuck_mj.errors import UserError
-from epuck_mj.files import write_bytes
 from epuck_mj.geometry import arena_box, drawn
-from epuck_mj.model import Scene, load_scene
-from epuck_mj.starts import FreeSpace
-from epuck_mj.tasks import START_CLEARANCE
-from epuck_mj.trajectory import Trajectory, record
+from epuck_mj.model import Scene
+from epuck_mj.trajectory import Trajectory
 
 LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}
 """OpenGL without a window, by MuJoCo's name for it, in the order tried."""
@@ -43,85 +32,135 @@ PATH_RADIUS = 0.004
 ELEVATION = -60.0
 """Of the camera's line of sight [degrees]."""
 
+MARK_HEIGHT, MARK_RADIUS = 0.07, 0.012
+"""Of the ball above a robot that tells it from others [m]."""
+
+DRAFT_SHADOWS = 1024
+"""Size of a draft's shadow map [pixels]."""
+
 CAMERA_DISTANCE = 1.05
 """Of the camera from the arena's middle, in diagonals of the arena."""
 
-
-@dataclass(frozen=True)
-class Options:
-    """Draw a controller's trial in 3D: the arena, the path, the robot at its end."""
-
-    champion: tyro.conf.Positional[Path]
-    """controller file (JSON)"""
-    output: Path
-    """picture to write (PNG)"""
-    robot: str = "epuck"
-    """name of a shipped robot, or path of an MJCF"""
-    arena: str | None = None
-    """name of a shipped arena, or path of an MJCF; the controller's own by default"""
-    width: int = 1200
-    """of the picture [pixels]"""
-    height: int = 800
-    """of the picture [pixels]"""
-    seconds: float = 30.0
-    """duration of the trial [s]"""
-    seed: int = 0
-    """of the start"""
+_CATEGORY = mujoco.mjtCatBit
 
 
-def render(scene: Scene, trajectory: Trajectory, width: int, height: int) -> np.ndarray:
-    """The arena with the path on its floor and the robot where it ended.
+class Painter:
+    """Draws trials in an arena at any of their times; made by `painter`."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        trajectories: Sequence[Trajectory],
+        width: int,
+        height: int,
+        draft: bool,
+    ):
+        """Set everything up; OpenGL has to be current."""
+        # the copy is for looking at only
+        model = copy.copy(scene.model)
+        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        if draft:
+            model.vis.quality.shadowsize = DRAFT_SHADOWS
+            model.vis.quality.offsamples = 0
+        model.geom_group[:] = np.where(drawn(model), 0, mujoco.mjNGROUP - 1)
+        if not model.nlight:
+            # the headlight's own share is meant to go with lights
+            model.vis.headlight.ambient[:] = 0.6
+            model.vis.headlight.diffuse[:] = 0.6
+        self._scene, self._model, self._data = scene, model, mujoco.MjData(model)
+        self._trajectories = trajectories
+        self._options = mujoco.MjvOption()
+        self._options.flags[mujoco.mjtVisFlag.mjVIS_RANGEFINDER] = False
+        steps = sum(trajectory.steps + 1 for trajectory in trajectories)
+        most = (model.ngeom + 1) * len(trajectories) + steps + 100
+        self._view = mujoco.MjvScene(model, most)
+        self._camera = _camera(model)
+        scale = mujoco.mjtFontScale.mjFONTSCALE_100.value
+        self._context = mujoco.MjrContext(model, scale)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+        self._frame = mujoco.MjrRect(0, 0, width, height)
+
+    def picture(self, time: float = np.inf) -> np.ndarray:
+        """The arena with the paths up to `time` [s] and the robots at their ends.
+
+        Returns:
+            Picture `(height, width, 3)`, 0 to 255.
+        """
+        for i, trajectory in enumerate(self._trajectories):
+            pose = _pose_at(trajectory, time)
+            self._data.qpos[:] = self._scene.qpos(pose)
+            mujoco.mj_forward(self._model, self._data)
+            if i == 0:
+                self._update()
+            else:
+                self._add_robot()
+            _add_path(self._view, trajectory, time, pose)
+            if len(self._trajectories) > 1:
+                _add_mark(self._view, pose, i)
+        mujoco.mjr_render(self._frame, self._view, self._context)
+        width, height = self._frame.width, self._frame.height
+        picture = np.zeros((height, width, 3), np.uint8)
+        depth = np.zeros((height, width), np.float32)
+        mujoco.mjr_readPixels(picture, depth, self._frame, self._context)
+        # white, as paper, behind an arena without a sky
+        picture[depth == 1] = 255
+        # OpenGL counts rows from below
+        return picture[::-1]
+
+    def _update(self) -> None:
+        """Begin a view: the arena and the first robot."""
+        mujoco.mjv_updateScene(
+            self._model,
+            self._data,
+            self._options,
+            None,
+            self._camera,
+            _CATEGORY.mjCAT_ALL.value,
+            self._view,
+        )
+
+    def _add_robot(self) -> None:
+        """One more robot, which the physics knows nothing of."""
+        mujoco.mjv_addGeoms(
+            self._model,
+            self._data,
+            self._options,
+            mujoco.MjvPerturb(),
+            _CATEGORY.mjCAT_DYNAMIC.value,
+            self._view,
+        )
+
+    def free(self) -> None:
+        """Give OpenGL's memory back."""
+        self._context.free()
+
+
+@contextmanager
+def painter(
+    scene: Scene,
+    trajectories: Sequence[Trajectory],
+    width: int,
+    height: int,
+    draft: bool = False,
+) -> Iterator[Painter]:
+    """Draws trials while the context lasts.
 
     Args:
-        scene: where the trajectory was recorded.
-        trajectory: what happened.
-        width: of the picture [pixels].
-        height: of the picture [pixels].
-
-    Returns:
-        Picture `(height, width, 3)`, 0 to 255.
+        scene: where the trajectories were recorded.
+        trajectories: what happened, at least one.
+        width: of the pictures [pixels].
+        height: of the pictures [pixels].
+        draft: coarser shadows and edges, in a third of the time.
 
     Raises:
         UserError: if no OpenGL is there.
     """
-    # the copy is for looking at only
-    model = copy.copy(scene.model)
-    model.vis.global_.offwidth, model.vis.global_.offheight = width, height
-    model.geom_group[:] = np.where(drawn(model), 0, mujoco.mjNGROUP - 1)
-    if not model.nlight:
-        # the headlight's own share is meant to go with lights
-        model.vis.headlight.ambient[:] = 0.6
-        model.vis.headlight.diffuse[:] = 0.6
-    data = mujoco.MjData(model)
-    data.qpos[:] = scene.qpos(trajectory.pose[-1])
-    mujoco.mj_forward(model, data)
-    options = mujoco.MjvOption()
-    options.flags[mujoco.mjtVisFlag.mjVIS_RANGEFINDER] = False
-
     with opengl(width, height):
-        view = mujoco.MjvScene(model, model.ngeom + trajectory.steps + 100)
-        mujoco.mjv_updateScene(
-            model,
-            data,
-            options,
-            None,
-            _camera(model),
-            mujoco.mjtCatBit.mjCAT_ALL.value,
-            view,
-        )
-        _add_path(view, trajectory)
-        context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, context)
-        frame = mujoco.MjrRect(0, 0, width, height)
-        mujoco.mjr_render(frame, view, context)
-        picture = np.zeros((height, width, 3), np.uint8)
-        depth = np.zeros((height, width), np.float32)
-        mujoco.mjr_readPixels(picture, depth, frame, context)
-        context.free()
-    # white, as paper, behind an arena without a sky
-    picture[depth == 1] = 255
-    # OpenGL counts rows from below
-    return picture[::-1]
+        artist = Painter(scene, trajectories, width, height, draft)
+        try:
+            yield artist
+        finally:
+            artist.free()
 
 
 @contextmanager
@@ -167,13 +206,25 @@ def _camera(model: mujoco.MjModel) -> mujoco.MjvCamera:
     return camera
 
 
-def _add_path(view: mujoco.MjvScene, trajectory: Trajectory) -> None:
-    """One capsule per control step, coloured by step fitness."""
-    points = np.full((trajectory.steps + 1, 3), PATH_HEIGHT)
-    points[:, :2] = trajectory.pose[:, :2]
+def _pose_at(trajectory: Trajectory, time: float) -> np.ndarray:
+    """Where the robot is at a time [s] between rows, `(3,)`; at the end it stays."""
+    x, y, yaw = trajectory.pose.T
+    columns = (x, y, np.unwrap(yaw))
+    return np.array([np.interp(time, trajectory.time, column) for column in columns])
+
+
+def _add_path(
+    view: mujoco.MjvScene, trajectory: Trajectory, time: float, pose: np.ndarray
+) -> None:
+    """One capsule per control step so far, coloured by step fitness."""
+    steps = int(np.searchsorted(trajectory.time[1:], time))
+    points = np.full((min(steps + 1, trajectory.steps) + 1, 3), PATH_HEIGHT)
+    points[:, :2] = trajectory.pose[: len(points), :2]
+    # the step that is going on ends where the robot is
+    points[-1, :2] = pose[:2]
     colors = blend(LOW_FITNESS, HIGH_FITNESS, trajectory.fitness) / 255
     kind = mujoco.mjtGeom.mjGEOM_CAPSULE.value
-    for start, end, color in zip(points[:-1], points[1:], colors, strict=True):
+    for start, end, color in zip(points[:-1], points[1:], colors, strict=False):
         geom = view.geoms[view.ngeom]
         rgba = np.array([*color, 1], np.float32)
         mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), rgba)
@@ -181,41 +232,15 @@ def _add_path(view: mujoco.MjvScene, trajectory: Trajectory) -> None:
         view.ngeom += 1
 
 
-def run(argv: Sequence[str]) -> int:
-    """Draw and write the picture; the exit status.
-
-    Raises:
-        UserError: for anything a user can put right.
-    """
-    options = parse(Options, "python -m epuck_mj.render", argv)
-    file = load(options.champion)
-    task = TaskParameters.from_dict(file.task)
-    steps = round(options.seconds / task.control_step)
-    for name, value in (
-        ("width", options.width),
-        ("height", options.height),
-        ("seconds, in control steps,", steps),
-    ):
-        if value < 1:
-            raise UserError(f"expected --{name} of at least 1, got {value}")
-    arena = options.arena or str(file.scene.get("arena", "arena"))
-    scene = load_scene(options.robot, arena, task.control_step)
-    space = FreeSpace(scene, START_CLEARANCE)
-    start = space.sample(np.random.default_rng(options.seed), 1)[0]
-    trajectory = record(scene, file.controller, start, replace(task, steps=steps))
-    picture = io.BytesIO()
-    pixels = render(scene, trajectory, options.width, options.height)
-    imsave(picture, pixels, format="png", metadata={"Software": "epuck_mj"})
-    try:
-        write_bytes(options.output, picture.getvalue())
-    except OSError as error:
-        raise UserError(f"cannot write '{options.output}': {error.strerror}") from None
-    print(
-        f"{options.output}: fitness {trajectory.trial_fitness:.1f} of {steps}"
-        + (f", crash after {trajectory.steps} steps" if trajectory.crashed else "")
+def _add_mark(view: mujoco.MjvScene, pose: np.ndarray, trial: int) -> None:
+    """A ball above the robot in the colour of its trial."""
+    rgba = np.array([*np.array(TRIALS[trial % len(TRIALS)]) / 255, 1], np.float32)
+    mujoco.mjv_initGeom(
+        view.geoms[view.ngeom],
+        mujoco.mjtGeom.mjGEOM_SPHERE.value,
+        np.full(3, MARK_RADIUS),
+        np.array([*pose[:2], MARK_HEIGHT]),
+        np.eye(3).ravel(),
+        rgba,
     )
-    return 0
-
-
-if __name__ == "__main__":
-    main(run)
+    view.ngeom += 1

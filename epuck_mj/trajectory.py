@@ -11,13 +11,14 @@ import numpy as np
 
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.control import Policy, TaskParameters, control_step
+from epuck_mj.controller import Controller
 from epuck_mj.errors import UserError
 from epuck_mj.files import read_arrays, write_arrays
 from epuck_mj.model import Scene
-from epuck_mj.sensors import observe
+from epuck_mj.sensors import observe, proximity
 from epuck_mj.simulation import SimulatedRobots
 
-FORMAT = "epuck_mj.trajectory/1"
+FORMAT = "epuck_mj.trajectory/2"
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +33,11 @@ class Trajectory:
         pose: where the robot was, `(T + 1, 3)`: x, y [m], yaw [rad].
         distance: along each proximity ray [m], negative where nothing was hit,
             `(T + 1, 8)`.
-        observation: the same as network input in [0, 1], `(T + 1, 8)`.
+        proximity: counts of each proximity sensor, `(T + 1, 8)`.
+        observation: what the policy saw of it, in [0, 1], `(T + 1, 8)`.
         contact: whether the shell touched a wall, `(T + 1,)`, bool.
+        hidden: output of the hidden neurons in [0, 1], `(T, hidden)`; of a policy
+            that has none, `(T, 0)`.
         action: what the policy decided, `(T, 2)`: v in [0, 1], w in [-1, 1].
         command: wheel speeds sent, left and right [rad/s], `(T, 2)`.
         fitness: step fitness, `(T,)`.
@@ -42,8 +46,10 @@ class Trajectory:
     time: np.ndarray
     pose: np.ndarray
     distance: np.ndarray
+    proximity: np.ndarray
     observation: np.ndarray
     contact: np.ndarray
+    hidden: np.ndarray
     action: np.ndarray
     command: np.ndarray
     fitness: np.ndarray
@@ -55,8 +61,10 @@ class Trajectory:
             "time": (float, (steps + 1,)),
             "pose": (float, (steps + 1, 3)),
             "distance": (float, (steps + 1, N_PROXIMITY)),
+            "proximity": (float, (steps + 1, N_PROXIMITY)),
             "observation": (float, (steps + 1, N_PROXIMITY)),
             "contact": (bool, (steps + 1,)),
+            "hidden": (float, (steps, *self.hidden.shape[-1:])),
             "action": (float, (steps, 2)),
             "command": (float, (steps, 2)),
             "fitness": (float, (steps,)),
@@ -142,12 +150,19 @@ def record(
         observations.append(observation)
         if step.reading.contact[0]:
             break
+    distance = np.concatenate([reading.distance for reading in readings])
+    seen = np.concatenate(observations)
+    # bit for bit what was inside the policy: it acts the same alone and in a crowd
+    network = isinstance(policy, Controller)
+    hidden = policy.activation(seen[:-1]) if network else np.zeros((len(steps), 0))
     return Trajectory(
         time=np.arange(len(poses)) * task.control_step,
         pose=np.concatenate(poses),
-        distance=np.concatenate([reading.distance for reading in readings]),
-        observation=np.concatenate(observations),
+        distance=distance,
+        proximity=np.rint(proximity(distance)),
+        observation=seen,
         contact=np.concatenate([reading.contact for reading in readings]),
+        hidden=hidden,
         action=np.concatenate([step.action for step in steps]),
         command=np.concatenate([step.command for step in steps]),
         fitness=np.concatenate([step.fitness for step in steps]),

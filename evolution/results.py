@@ -9,7 +9,7 @@ import numpy as np
 from epuck_mj import files
 from epuck_mj.controller import ControllerFile
 from epuck_mj.model import Scene, load_scene
-from epuck_mj.recording import save_recording
+from epuck_mj.recording import Trial, save_recording
 from epuck_mj.trajectory import record
 from evolution.champion import Champion, choose_champion, most_believed
 from evolution.config import ExperimentConfig
@@ -161,11 +161,9 @@ def _show(
         trajectory_figure(scene, trials, task, titles), directory.trajectory_figure
     )
     trials[0].save(directory.trajectory)
-    save_recording(
-        directory.recording,
-        scene,
-        trials[0],
-        task,
-        title=f"{experiment.optimizer.name}, seed {experiment.config.seed}",
-        summary=summary(controller),
+    trial = Trial("start 0", trials[0], task)
+    title = f"{experiment.optimizer.name}, seed {experiment.config.seed}"
+    text = (
+        f"# {title}\n\n{summary(controller)}\n\n```\n{experiment.config.to_yaml()}```\n"
     )
+    save_recording(directory.recording, scene, [trial], title, text)

@@ -4,6 +4,7 @@ import argparse
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -21,6 +22,7 @@ from evolution.config import (
 )
 from evolution.execution import Means, Run
 from evolution.interruption import Interrupted, interruptible
+from evolution.live import Live, require_viewer
 from evolution.progress import Progress
 from evolution.results import summary
 from evolution.run_directory import RunDirectory
@@ -43,6 +45,8 @@ class Options:
             Changes no result.
         racing: break off individuals that can only lose, where the optimiser allows it
             (--no-racing lets them live). Changes no result.
+        live: show curves and the best individual in the rerun viewer that is running.
+            Changes no result.
         print_config: print the resolved YAML and run nothing.
     """
 
@@ -53,6 +57,7 @@ class Options:
     threads: int = 0
     engine: Literal["batch", "dm_control"] = "batch"
     racing: bool = True
+    live: bool = False
     print_config: bool = False
 
 
@@ -67,6 +72,8 @@ def run(argv: Sequence[str]) -> int:
         print(options.config.to_yaml(), end="")
         return 0
     check_threads(options.threads)
+    if options.live:
+        require_viewer()
     if options.resume is not None:
         directory = RunDirectory(options.resume)
         directory.refuse_other_config(options.config)
@@ -91,7 +98,7 @@ def run(argv: Sequence[str]) -> int:
                 )
         else:
             evolution.start()
-        return _carry_out(evolution)
+        return _carry_out(evolution, options.live)
 
 
 def _options(argv: Sequence[str]) -> Options:
@@ -124,16 +131,21 @@ def _options(argv: Sequence[str]) -> Options:
     return options
 
 
-def _carry_out(evolution: Run) -> int:
+def _carry_out(evolution: Run, live: bool) -> int:
     """Evolve, then choose and show the champion; the exit status."""
     experiment, directory = evolution.experiment, evolution.directory
     started = time.monotonic()
     try:
         with interruptible():
             budget = experiment.config.evaluations
-            with Progress(budget, experiment.evaluations) as progress:
+            with (
+                Live(experiment) if live else nullcontext() as view,
+                Progress(budget, experiment.evaluations) as progress,
+            ):
                 for record in evolution.evolve():
                     progress.update(record)
+                    if view is not None:
+                        view.update()
             print("Choosing the champion on fresh starts ...", file=sys.stderr)
             controller = evolution.finish()
     except Interrupted as interruption:
@@ -156,7 +168,7 @@ def _carry_out(evolution: Run) -> int:
 
 
 def _replay(directory: RunDirectory) -> str:
-    return f"Replay: {command('rerun', directory.recording)}"
+    return f"Replay: {command('evolution.replay', directory.path)}"
 
 
 if __name__ == "__main__":

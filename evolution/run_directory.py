@@ -28,6 +28,7 @@ class RunDirectory:
         self.provenance = path / "provenance.json"
         self.checkpoint = path / "checkpoint.npz"
         self.history = path / "history.csv"
+        self.best_individuals = path / "best_individuals.npz"
         self.timing = path / "timing.csv"
         self.champion = path / "champion.json"
         self.fitness_figure = path / "fitness.png"
@@ -134,7 +135,9 @@ class RunDirectory:
         if self.checkpoint.exists():
             state = files.read_arrays(self.checkpoint)
             try:
-                if str(state.pop("config", "")) != experiment.config.to_yaml():
+                config = str(state.pop("config", ""))
+                where = f"its config in '{self.checkpoint}'"
+                if ExperimentConfig.from_yaml(config, where) != experiment.config:
                     raise ValueError("it was made with another config")
                 experiment.restore(state)
             except ValueError as error:
@@ -143,8 +146,8 @@ class RunDirectory:
                 ) from None
         with files.writing(self.path):
             files.remove_leftovers(self.path)
-            # the run may have been killed between its two files
-            files.write_text(self.history, experiment.history())
+            # the run may have been killed between its files
+            self._write_derived(experiment)
             resumed = [*first.get("resumed", ()), provenance]
             files.write_text(self.provenance, to_json({**first, "resumed": resumed}))
         keys = ("versions", "git", "processor")
@@ -173,7 +176,7 @@ class RunDirectory:
         try:
             state = {"config": config, **experiment.state()}
             files.write_arrays(self.checkpoint, state)
-            files.write_text(self.history, experiment.history())
+            self._write_derived(experiment)
             with self.timing.open("a", encoding="utf-8") as file:
                 if file.tell() == 0:
                     file.write("generation,seconds,control_steps,crash_rate\n")
@@ -189,6 +192,16 @@ class RunDirectory:
                 f"cannot write '{self.path}': {error.strerror}; what was there before "
                 f"is intact: --resume {self.path}"
             ) from None
+
+    def _write_derived(self, experiment: Experiment) -> None:
+        """What the checkpoint holds as well, for those who only read."""
+        files.write_text(self.history, experiment.history())
+        if experiment.records:
+            best = {
+                "genomes": np.array(experiment.best_genomes),
+                "fitness": np.array([record.best for record in experiment.records]),
+            }
+            files.write_arrays(self.best_individuals, best)
 
     def evaluations(self) -> int:
         """Individuals evaluated up to the checkpoint."""

@@ -11,12 +11,13 @@ MODULES = sorted([*ROOT.glob("epuck_mj/**/*.py"), *ROOT.glob("evolution/**/*.py"
 LAYERS = [
     {"errors", "constants"},
     {"sensors", "motors", "fitness", "controller", "files", "command_line"},
-    {"control", "wall_follower", "model", "colors"},
-    {"simulation", "geometry"},
+    {"control", "wall_follower", "model", "colors", "calibration"},
+    {"simulation", "geometry", "disturbances"},
+    {"disturbed_robots"},
     {"starts", "outline", "trajectory", "tracks", "clearance"},
-    {"tasks", "recording", "wall_loops"},
-    {"render", "metrics"},
-    {"behaviour_classes"},
+    {"tasks", "phases", "wall_loops"},
+    {"recording", "render", "metrics", "check", "view"},
+    {"behaviour_classes", "video", "bridge"},
 ]
 """Modules of epuck_mj; each imports from layers above its own here only."""
 
@@ -27,6 +28,18 @@ NUMPY_ONLY = {
     "epuck_mj/controller.py",
     "epuck_mj/control.py",
     "epuck_mj/wall_follower.py",
+    "epuck_mj/bridge/ascii.py",
+    "epuck_mj/bridge/binary.py",
+    "epuck_mj/bridge/body.py",
+    "epuck_mj/bridge/builds.py",
+    "epuck_mj/bridge/errors.py",
+    "epuck_mj/bridge/firmware.py",
+    "epuck_mj/bridge/packets.py",
+    "epuck_mj/bridge/parsing.py",
+    "epuck_mj/bridge/protocol.py",
+    "epuck_mj/bridge/replies.py",
+    "epuck_mj/bridge/wifi_firmware.py",
+    "epuck_mj/bridge/wire.py",
     "evolution/ask_tell.py",
     "evolution/bounds.py",
     "evolution/optimizer.py",
@@ -42,14 +55,21 @@ ALLOWED_IN = {
     "dask": "evolution/cluster/",
     "distributed": "evolution/cluster/",
     "rerun": "epuck_mj/recording/",
-    "serial": "epuck_mj/bridge/",
+    "serial": "epuck_mj/bridge/link.py",
     "contourpy": "epuck_mj/wall_loops.py",
+    "imageio_ffmpeg": "epuck_mj/video.py",
     "matplotlib": (
-        "epuck_mj/render.py",
+        "epuck_mj/check/picture.py",
         "evolution/figures.py",
+        "evolution/gap/figure.py",
+        "evolution/replay/command.py",
         "evolution/report/figures/",
     ),
-    "yaml": ("evolution/config.py", "evolution/study_config.py"),
+    "yaml": (
+        "epuck_mj/calibration.py",
+        "evolution/config.py",
+        "evolution/study_config.py",
+    ),
 }
 """Packages that only one place may import."""
 
@@ -87,7 +107,7 @@ def test_packages_stay_where_they_belong(path):
 
 def test_every_module_of_the_robot_has_a_layer():
     inside = {path for path in (ROOT / "epuck_mj").iterdir() if path.suffix == ".py"}
-    names = {path.stem for path in inside} | {"recording"}
+    names = {path.stem for path in inside} | {"bridge", "check", "recording"}
     assert names - {"__init__"} == set().union(*LAYERS)
 
 

@@ -9,6 +9,8 @@ import pytest
 
 from epuck_mj.controller import load
 from epuck_mj.errors import UserError
+from epuck_mj.files import read_arrays
+from epuck_mj.model import load_scene
 from evolution.config import ExperimentConfig, find_config, load_config
 from evolution.evaluate import evaluate
 from evolution.execution import Means, Run
@@ -56,6 +58,24 @@ def test_a_study_a_run_and_a_file_lead_to_the_same_champion(finished, capsys):
     assert len({outcome.strip() for outcome in outcomes}) == 1
 
 
+def test_generations_are_tested_one_by_one(finished, tmp_path, capsys):
+    out = tmp_path / "out.json"
+    few = ["--starts", "20", "--robot", "epuck_planar", "--json", str(out)]
+    assert evaluate([str(finished), "--generations", "0,last", *few]) == 0
+    tests = json.loads(out.read_text())
+    names = [f"{finished} generation 0", f"{finished} generation 1"]
+    assert [test["name"] for test in tests] == names
+    said = capsys.readouterr().out
+    assert all(f"{name}, epuck_planar in arena\n" in said for name in names)
+    # each is what anybody finds for its genome
+    config = load_config(finished / "config.yaml")
+    scene = load_scene("epuck_planar", "arena", config.control_step)
+    judge = Judge(scene, config.task, config.start_clearance)
+    genomes = read_arrays(finished / "best_individuals.npz")["genomes"]
+    for genome, test in zip(genomes, tests, strict=True):
+        assert judge.test(config.network.decode(genome), 20).mean == test["mean"]
+
+
 def test_the_hand_written_follower_follows(capsys):
     arguments = ["wall-follower", "--starts", "10", "--robot", "epuck_planar"]
     assert evaluate(arguments) == 0
@@ -86,6 +106,7 @@ def test_another_arena(finished, tmp_path, capsys):
         (["nowhere"], "no champion in 'nowhere'"),
         (["wall-follower", "--starts", "1"], "expected 2 to 100000 starts, got 1"),
         (["wall-follower", "--robot", "r2d2"], "r2d2"),
+        (["wall-follower", "--generations", "0"], "saved its generations"),
         (["."], "no champion in '.'"),
     ],
 )

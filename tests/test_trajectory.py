@@ -1,6 +1,8 @@
 """Trajectories: what is recorded is what happened, and comes back from its file."""
 
 import dataclasses
+import io
+import zipfile
 
 import numpy as np
 import pytest
@@ -10,9 +12,10 @@ from epuck_mj.controller import Network
 from epuck_mj.errors import UserError
 from epuck_mj.model import load_scene
 from epuck_mj.motors import command
-from epuck_mj.sensors import observe
+from epuck_mj.sensors import observe, proximity
 from epuck_mj.simulation import SimulatedRobots
 from epuck_mj.trajectory import Trajectory, record
+from epuck_mj.wall_follower import WallFollower
 
 TASK = TaskParameters(steps=60)
 STARTS = np.array([[0.0, 0.0, 0.0], [0.42, 0.1, 0.4], [-0.2, -0.44, 3.0]])
@@ -61,6 +64,8 @@ def test_rows_are_the_steps_of_one_trial(scene):
         trajectory.time, np.arange(steps + 1) * TASK.control_step
     )
     np.testing.assert_array_equal(seen, observe(trajectory.distance, TASK.sensor_range))
+    counts = np.rint(proximity(trajectory.distance))
+    np.testing.assert_array_equal(trajectory.proximity, counts)
     for k in range(steps):
         np.testing.assert_array_equal(trajectory.action[k], controller(seen[k]))
     np.testing.assert_array_equal(
@@ -69,6 +74,27 @@ def test_rows_are_the_steps_of_one_trial(scene):
     fitness = TASK.step_fitness(trajectory.action, seen[1:])
     fitness[trajectory.contact[1:]] = 0
     np.testing.assert_array_equal(trajectory.fitness, fitness)
+
+
+@pytest.mark.parametrize("hidden", [1, 4, 7])
+def test_hidden_is_what_the_hidden_neurons_put_out(scene, hidden):
+    network = Network(hidden, biases=True)
+    genome = np.random.default_rng(0).uniform(-5, 5, network.n_genes)
+    controller = network.decode(genome)
+    trajectory = record(scene, controller, STARTS[1], TASK)
+    assert trajectory.hidden.shape == (trajectory.steps, hidden)
+    for k in range(trajectory.steps):
+        alone = controller.activation(trajectory.observation[k])
+        np.testing.assert_array_equal(trajectory.hidden[k], alone)
+    assert np.ptp(trajectory.hidden) > 0
+
+
+@pytest.mark.parametrize("policy", [straight_on, WallFollower()], ids=["line", "wall"])
+def test_a_policy_without_neurons_has_none(scene, policy, tmp_path):
+    trajectory = record(scene, policy, STARTS[1], TASK)
+    assert trajectory.hidden.shape == (trajectory.steps, 0)
+    trajectory.save(tmp_path / "trial.npz")
+    assert equal(Trajectory.load(tmp_path / "trial.npz"), trajectory)
 
 
 def test_a_crash_ends_the_trial_and_is_its_last_row(scene):
@@ -99,12 +125,33 @@ def test_file_gives_the_trajectory_back_in_equal_bytes(scene, tmp_path, monkeypa
     assert sorted(tmp_path.iterdir()) == [first, second]
 
 
+def _with_another_header(content):
+    """An archive whose arrays have damaged headers under good checksums."""
+    damaged = io.BytesIO()
+    with (
+        zipfile.ZipFile(io.BytesIO(content)) as archive,
+        zipfile.ZipFile(damaged, "w") as copy,
+    ):
+        for name in archive.namelist():
+            array = archive.read(name)
+            assert b"'descr'" in array
+            copy.writestr(name, array.replace(b"'descr'", b"'desk\n'"))
+    return damaged.getvalue()
+
+
+def test_a_trajectory_of_a_whole_trial_is_a_small_file(scene, tmp_path):
+    trajectory = record(scene, WallFollower(), STARTS[0], TaskParameters(steps=300))
+    trajectory.save(tmp_path / "trial.npz")
+    numbers = sum(getattr(trajectory, name).nbytes for name in FIELDS)
+    assert (tmp_path / "trial.npz").stat().st_size < numbers / 2
+
+
 def test_files_that_are_none_are_refused_in_one_line(scene, tmp_path):
     path = tmp_path / "trial.npz"
     record(scene, straight_on, STARTS[1], TASK).save(path)
     content = path.read_bytes()
     contents = [content[:length] for length in (0, 1, 50, 500, len(content) - 1)]
-    contents += [b"no archive", content.replace(b"'descr'", b"'desk\n'")]
+    contents += [b"no archive", _with_another_header(content)]
     for damaged in contents:
         path.write_bytes(damaged)
         with pytest.raises(UserError, match=r"trial\.npz") as error:
@@ -116,14 +163,20 @@ def test_other_arrays_are_refused(scene, tmp_path):
     path = tmp_path / "other.npz"
     trajectory = record(scene, straight_on, STARTS[1], TASK)
     arrays = {name: getattr(trajectory, name) for name in FIELDS}
-    name = np.array("epuck_mj.trajectory/1")
+    name = np.array("epuck_mj.trajectory/2")
     for foreign, message in [
         (arrays, "expected format"),
-        (arrays | {"format": np.array("epuck_mj.trajectory/2")}, "expected format"),
+        (arrays | {"format": np.array("epuck_mj.trajectory/1")}, "expected format"),
         ({"format": name, "time": arrays["time"]}, "missing"),
         (arrays | {"format": name, "more": name}, "more"),
         (arrays | {"format": name, "pose": arrays["pose"][:-1]}, "expected pose"),
         (arrays | {"format": name, "contact": arrays["time"]}, "expected contact"),
+        (arrays | {"format": name, "hidden": arrays["time"]}, "expected hidden"),
+        (arrays | {"format": name, "hidden": np.float64(1)}, "expected hidden"),
+        (
+            arrays | {"format": name, "proximity": arrays["distance"][1:]},
+            "expected proximity",
+        ),
     ]:
         np.savez(path, **foreign)
         with pytest.raises(UserError, match=message):

@@ -1,39 +1,73 @@
-"""Geoms of a compiled scene as rerun's shapes."""
+"""Geoms of a compiled scene as rerun's shapes: what does not change."""
 
 import mujoco
 import numpy as np
 import rerun as rr
 
 from epuck_mj.geometry import arena_box, color, drawn, moving_bodies
+from epuck_mj.model import ROBOT_BODY
+from epuck_mj.recording.entities import ARENA, Entities
 
 FLOOR_THICKNESS = 0.002
 """Of planes, as drawn [m]."""
 
 
-def log_geoms(stream: rr.RecordingStream, model: mujoco.MjModel) -> None:
-    """What does not change: geoms in the frame of their body."""
+MARK_HEIGHT = 0.085
+"""Height above the robot of the mark that tells it from others [m]."""
+
+
+def log_arena(stream: rr.RecordingStream, model: mujoco.MjModel) -> None:
+    """All that stands still, where it stands."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    moving = moving_bodies(model)
-    for geom in np.flatnonzero(drawn(model)):
-        body = model.geom_bodyid[geom]
-        position, quaternion = model.geom_pos[geom], model.geom_quat[geom]
-        if body not in moving:
-            position, quaternion = data.geom_xpos[geom], np.zeros(4)
-            mujoco.mju_mat2Quat(quaternion, data.geom_xmat[geom])
-        name = model.geom(geom).name or f"geom{geom}"
-        place = rr.Transform3D(
-            translation=position, quaternion=quaternion[[1, 2, 3, 0]].tolist()
+    for geom in _drawn(model, moving=False):
+        quaternion = np.zeros(4)
+        mujoco.mju_mat2Quat(quaternion, data.geom_xmat[geom])
+        _log(stream, model, geom, ARENA, data.geom_xpos[geom], quaternion)
+
+
+def log_robot(
+    stream: rr.RecordingStream, model: mujoco.MjModel, place: Entities
+) -> None:
+    """All that moves, in the frame of its body; with a mark if there are others."""
+    for geom in _drawn(model, moving=True):
+        body = place.body(body_name(model, model.geom_bodyid[geom]))
+        _log(stream, model, geom, body, model.geom_pos[geom], model.geom_quat[geom])
+    if not place.alone:
+        mark = rr.Points3D(
+            [(0, 0, MARK_HEIGHT)],
+            radii=[0.01],
+            colors=[place.color],
+            labels=[place.name],
         )
-        shape = _shape(model, int(geom))
-        stream.log(f"{body_entity(model, body)}/{name}", place, shape, static=True)
+        stream.log(f"{place.body(ROBOT_BODY)}/mark", mark, static=True)
 
 
-def body_entity(model: mujoco.MjModel, body: int) -> str:
-    """Where a body is logged; all that stands still is the arena."""
-    if model.body_weldid[body] == 0:
-        return "world/arena"
-    return f"world/{model.body(body).name or f'body{body}'}"
+def body_name(model: mujoco.MjModel, body: int) -> str:
+    """Of a body that may have none in the model."""
+    return model.body(body).name or f"body{body}"
+
+
+def _drawn(model: mujoco.MjModel, moving: bool) -> list[int]:
+    """Geoms to be seen that move, or do not."""
+    moves = np.isin(model.geom_bodyid, moving_bodies(model))
+    return np.flatnonzero(drawn(model) & (moves == moving)).tolist()
+
+
+def _log(
+    stream: rr.RecordingStream,
+    model: mujoco.MjModel,
+    geom: int,
+    parent: str,
+    position: np.ndarray,
+    quaternion: np.ndarray,
+) -> None:
+    name = model.geom(geom).name or f"geom{geom}"
+    # MuJoCo says wxyz, rerun xyzw
+    place = rr.Transform3D(
+        translation=position, quaternion=quaternion[[1, 2, 3, 0]].tolist()
+    )
+    stream.log(f"{parent}/{name}", place, _shape(model, geom), static=True)
 
 
 def _shape(model: mujoco.MjModel, geom: int) -> rr.AsComponents:

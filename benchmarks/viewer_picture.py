@@ -1,0 +1,135 @@
+"""A picture of a recording in rerun's viewer: `python -m benchmarks.viewer_picture`.
+
+The viewer runs without a window; it needs a Vulkan driver, of which Mesa's for the
+processor will do (Debian: mesa-vulkan-drivers).
+"""
+
+import os
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import tyro
+from rerun.experimental import ViewerClient
+
+from epuck_mj.command_line import main, parse
+from epuck_mj.errors import UserError
+from epuck_mj.files import write_bytes, writing
+from evolution.replay.viewer import viewer_binary
+from evolution.replay.web import free_ports
+
+PATIENCE = 60.0
+"""How long the viewer may take to do what it is asked for [s]."""
+
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True)
+class Options:
+    """Draw what the rerun viewer shows of a recording, without a window.
+
+    Attributes:
+        recording: of trials (.rrd).
+        output: picture to write (PNG).
+        time: of the trial that is shown [s].
+        size: width and height of the viewer [pixels].
+    """
+
+    recording: tyro.conf.Positional[Path]
+    output: Path
+    time: float = 25.0
+    size: tuple[int, int] = (1600, 1000)
+
+
+@contextmanager
+def viewer(recording: Path, size: tuple[int, int]) -> Iterator[ViewerClient]:
+    """A viewer without a window that has loaded a recording.
+
+    Raises:
+        UserError: if it does not start, as without a Vulkan driver.
+    """
+    (port,) = free_ports(1)
+    with tempfile.TemporaryDirectory() as home:
+        process = subprocess.Popen(
+            [
+                *(viewer_binary(), recording, "--headless"),
+                *("--bind", "127.0.0.1", "--port", str(port)),
+                *("--window-size", f"{size[0]}x{size[1]}"),
+            ],
+            # nothing of a person's own settings, and no calls home
+            env={
+                **os.environ,
+                **{"HOME": home, "XDG_RUNTIME_DIR": home},
+                **{"CI": "1", "RUST_LOG": "error"},
+                **{"HTTPS_PROXY": "http://127.0.0.1:9", "NO_PROXY": "127.0.0.1"},
+            },
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+        def connected() -> ViewerClient | None:
+            if process.poll() is not None:
+                raise UserError(
+                    f"the rerun viewer ended with status {process.returncode}: "
+                    "expected a Vulkan driver (Debian: mesa-vulkan-drivers)"
+                )
+            try:
+                client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+                state = client.get_state()
+            except (ConnectionError, RuntimeError, OSError):
+                return None
+            there = state.active_recording and state.views and not state.loading
+            return client if there else None
+
+        try:
+            yield _until(connected)
+        finally:
+            process.kill()
+            process.wait()
+
+
+def picture(client: ViewerClient, time: float) -> bytes:
+    """What the viewer shows at a time of the trial [s], once it has settled, as PNG."""
+    client.set_time("sim_time", duration=time, play_state="paused")
+    shots = [client.take_screenshot()]
+
+    def settled() -> bytes | None:
+        shots.append(client.take_screenshot())
+        return shots[-1] if shots[-1] == shots[-2] else None
+
+    return _until(settled)
+
+
+def _until(attempt: Callable[[], Value | None]) -> Value:
+    """What an attempt gives, as soon as that is something."""
+    end = time.monotonic() + PATIENCE
+    while (value := attempt()) is None:
+        if time.monotonic() > end:
+            raise UserError(f"the rerun viewer took more than {PATIENCE:g} s")
+        time.sleep(0.2)
+    return value
+
+
+def draw(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status.
+
+    Raises:
+        UserError: if the viewer does not work, or the file cannot be written.
+    """
+    options = parse(Options, "python -m benchmarks.viewer_picture", argv)
+    if not options.recording.is_file():
+        raise UserError(f"no recording '{options.recording}'")
+    with viewer(options.recording, options.size) as client:
+        pixels = picture(client, options.time)
+    with writing(options.output.parent):
+        write_bytes(options.output, pixels)
+    return 0
+
+
+if __name__ == "__main__":
+    main(draw)

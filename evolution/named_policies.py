@@ -1,0 +1,201 @@
+"""Policies by the name a person gives: of a run, a study or a file, or wall-follower.
+
+What can be evaluated and replayed: champions, the best individuals of past generations,
+and the follower written by hand.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from epuck_mj import controller, files
+from epuck_mj.control import Policy, TaskParameters
+from epuck_mj.errors import UserError
+from epuck_mj.tasks import START_CLEARANCE
+from epuck_mj.wall_follower import WallFollower
+from evolution.config import ExperimentConfig, load_config
+from evolution.run_directory import RunDirectory
+from evolution.study_data import YARDSTICK
+
+LAST = "last"
+"""Name of the latest generation."""
+
+
+@dataclass(frozen=True)
+class NamedPolicy:
+    """A policy, and where it comes from.
+
+    Attributes:
+        source: path or name that a person gave it by.
+        policy: itself.
+        task: what its trials were.
+        robot: that it was evolved on.
+        arena: that it was evolved in.
+        start_clearance: least distance from the shell to a wall at its starts [m].
+        scores: what is known of its worth, as in a controller file.
+        config: of its run, if that is known.
+        variant: which of the source's policies it is, if there are more.
+    """
+
+    source: str
+    policy: Policy
+    task: TaskParameters
+    robot: str = "epuck_planar"
+    arena: str = "arena"
+    start_clearance: float = START_CLEARANCE
+    scores: dict | None = None
+    config: ExperimentConfig | None = None
+    variant: str = ""
+
+    @property
+    def name(self) -> str:
+        """What it is called beside others."""
+        return f"{self.source} {self.variant}".rstrip()
+
+
+def named_policies(path: str, generations: str | None = None) -> list[NamedPolicy]:
+    """The policies at a path, at least one.
+
+    Args:
+        path: a run or study directory, a controller file, or `wall-follower`.
+        generations: instead of champions, the best individuals of these generations of
+            a run: numbers from 0 on and `last`, with commas in between.
+
+    Raises:
+        UserError: if there are none.
+    """
+    if generations is not None:
+        return _best_individuals(RunDirectory(Path(path)), generations)
+    if path == YARDSTICK:
+        return [NamedPolicy(YARDSTICK, WallFollower(), TaskParameters())]
+    place = Path(path)
+    if files.is_file(place):
+        return [_champion(place, path, None)]
+    runs = [RunDirectory(champion.parent) for champion in _champions(place)]
+    if not runs:
+        raise UserError(
+            f"no champion in '{path}': expected the directory of a finished run, "
+            f"or of a study with one, a controller file, or {YARDSTICK}"
+        )
+    return [
+        _champion(
+            run.champion,
+            str(run.path),
+            load_config(run.config) if files.is_file(run.config) else None,
+        )
+        for run in runs
+    ]
+
+
+def _champions(place: Path) -> list[Path]:
+    """A run's own, or those of all the runs of a study."""
+    if not files.is_directory(place):
+        return []
+    return sorted(place.glob("champion.json")) or sorted(
+        place.glob("*/seed-*/champion.json"),
+        key=lambda p: (p.parent.parent.name, len(p.parent.name), p.parent.name),
+    )
+
+
+def _champion(path: Path, name: str, config: ExperimentConfig | None) -> NamedPolicy:
+    file = controller.load(path)
+    for key in ("robot", "arena"):
+        if not isinstance(file.scene.get(key), str):
+            raise UserError(f"'{path}' does not say which {key} it is for")
+    return NamedPolicy(
+        name,
+        file.controller,
+        TaskParameters.from_dict(file.task),
+        file.scene["robot"],
+        file.scene["arena"],
+        # a file alone does not say
+        config.start_clearance if config else START_CLEARANCE,
+        file.scores,
+        config,
+    )
+
+
+def _best_individuals(run: RunDirectory, generations: str) -> list[NamedPolicy]:
+    """The best individuals of those generations of a run, finished or not."""
+    path = run.best_individuals
+    for file in (run.config, path):
+        if not files.is_file(file):
+            raise UserError(
+                f"no '{file}': expected a run that has saved its generations"
+            )
+    config, best = run.stored_config(), files.read_arrays(path)
+    genomes, fitness = (best.get(name, np.empty(0)) for name in ("genomes", "fitness"))
+    n, n_genes = fitness.size, config.network.n_genes
+    if not n or fitness.shape != (n,) or genomes.shape != (n, n_genes):
+        raise UserError(
+            f"'{path}': expected genomes (generations, {n_genes}) and fitness "
+            f"(generations,), got {genomes.shape} and {fitness.shape}"
+        )
+    for array in (genomes, fitness):
+        if array.dtype != float or not np.isfinite(array).all():
+            raise UserError(f"'{path}': expected finite numbers")
+    return [
+        NamedPolicy(
+            str(run.path),
+            config.network.decode(genomes[generation]),
+            config.task,
+            config.robot,
+            config.arena,
+            config.start_clearance,
+            {"stored": float(fitness[generation])},
+            config,
+            f"generation {generation}",
+        )
+        for generation in dict.fromkeys(_indices(generations, n))
+    ]
+
+
+def _indices(generations: str, n: int) -> Iterator[int]:
+    """Numbers of generations, of which there are `n`."""
+    for word in generations.split(","):
+        index = n - 1 if word.strip() == LAST else _number(word)
+        if index is None or index >= n:
+            raise UserError(
+                f"expected generations from 0 to {n - 1} or {LAST}, with commas in "
+                f"between, got '{generations}'"
+            )
+        yield index
+
+
+def _number(word: str) -> int | None:
+    return int(word) if re.fullmatch(r"\s*\d{1,9}\s*", word) else None
+
+
+def described(policy: NamedPolicy) -> str:
+    """What is known of a policy, as Markdown."""
+    lines = [f"## {policy.name}", "", *_scores(policy.scores or {}), ""]
+    config = policy.config
+    settings = config.to_yaml() if config else _plain(policy)
+    return "\n".join([*lines, "```", settings.rstrip(), "```", ""])
+
+
+def _plain(policy: NamedPolicy) -> str:
+    fields = {"robot": policy.robot, "arena": policy.arena, **asdict(policy.task)}
+    return "\n".join(f"{key}: {value}" for key, value in fields.items())
+
+
+def _scores(scores: dict) -> Iterator[str]:
+    """A line per score; of unknown ones nothing."""
+    for key, title in (
+        ("stored", "Stored fitness, what evolution believed"),
+        ("validation", "On validation starts, where the champion was chosen"),
+    ):
+        if isinstance(scores.get(key), int | float):
+            yield f"- {title}: {scores[key]:.1f}"
+    held_out = scores.get("held_out")
+    for robot, test in held_out.items() if isinstance(held_out, dict) else ():
+        try:
+            yield (
+                f"- Held-out fitness, {robot}: {test['mean']:.1f} over "
+                f"{test['starts']:,} starts, {test['crash_rate']:.1%} crash"
+            )
+        except (KeyError, TypeError, ValueError):
+            continue

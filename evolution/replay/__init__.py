@@ -1,0 +1,1 @@
+"""Replay: `python -m evolution.replay PATH [options]`."""

@@ -1,0 +1,309 @@
+"""Replays as people see them: rerun's viewer without a window, and the web page."""
+
+import io
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun.blueprint as rrb
+from matplotlib.image import imread
+from rerun.experimental import ViewerClient
+
+from evolution.replay.command import replay
+from evolution.replay.viewer import viewer_binary
+from tests.browser import MISSING, browser, until
+
+ROOT = Path(__file__).parent.parent
+CHAMPION = ROOT / "results/paper/de-best/seed-1/champion.json"
+PATIENCE = 120
+"""Seconds for what takes ten on a machine that does nothing else."""
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A working directory on a machine that is alone."""
+    for name in list(os.environ):
+        if name in ("DISPLAY", "WAYLAND_DISPLAY", "RERUN") or name.startswith("XDG_"):
+            monkeypatch.delenv(name)
+    for name, value in {
+        "CI": "1",
+        "RERUN_STRICT": "1",
+        "RUST_LOG": "error",
+        "HOME": str(tmp_path),
+        "XDG_RUNTIME_DIR": str(tmp_path),
+        "HTTPS_PROXY": "http://127.0.0.1:9",
+        "NO_PROXY": "127.0.0.1,localhost",
+        "PYTHONPATH": str(ROOT),
+    }.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+class Viewer:
+    """A viewer without a window."""
+
+    def __init__(self, client: ViewerClient):
+        self.client = client
+
+    def state(self):
+        """What is open, once everything has been loaded."""
+
+        def loaded():
+            state = self.client.get_state()
+            ready = state.active_recording and state.views and not state.loading
+            return state if ready else None
+
+        return until(loaded, PATIENCE)
+
+    def picture_at(self, seconds: float) -> np.ndarray:
+        """Of the whole window at a time, once it no longer changes."""
+        self.client.set_time("sim_time", duration=seconds, play_state="paused")
+        pictures: list[bytes] = []
+
+        # plots fill within a few frames
+        def settled():
+            pictures.append(self.client.take_screenshot())
+            return pictures[-1] in pictures[-2:-1]
+
+        until(settled, PATIENCE)
+        return imread(io.BytesIO(pictures[-1]))
+
+    def picture_of(self, view: str) -> np.ndarray | None:
+        """Of a view; None if it is behind a tab."""
+        try:
+            return imread(io.BytesIO(self.client.take_screenshot(view)))
+        except Exception as error:  # rerun's own have no common base
+            if "not found" not in str(error):
+                raise
+            return None
+
+
+@contextmanager
+def viewer(recording: Path, size: str) -> Iterator[Viewer]:
+    """A viewer of a recording; a reason to skip where no Vulkan driver is."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    said = recording.with_suffix(".log")
+    with said.open("w") as output:
+        process = subprocess.Popen(
+            [
+                *(viewer_binary(), recording, "--headless", "--bind", "127.0.0.1"),
+                *("--port", str(port), "--window-size", size),
+            ],
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+        )
+    try:
+        yield Viewer(_connected(process, said, port))
+    finally:
+        process.terminate()
+        process.wait(PATIENCE)
+
+
+def _connected(process: subprocess.Popen, said: Path, port: int) -> ViewerClient:
+    end = time.monotonic() + PATIENCE
+    while True:
+        try:
+            client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+            # it answers before it knows whether it can paint
+            client.take_screenshot()
+            return client
+        except Exception:  # rerun's own have no common base
+            if process.poll() is not None:
+                words = said.read_text()
+                if "Failed to get render context" in words:
+                    pytest.skip("no Vulkan driver here (Debian: mesa-vulkan-drivers)")
+                pytest.fail(f"the viewer ended: {words[:1000]}")
+            assert time.monotonic() < end, "the viewer does not answer"
+            time.sleep(0.1)
+
+
+BLANK = 12
+"""Colours of a view without content, at most: its title, axes and grid have 9."""
+
+
+def colours(picture: np.ndarray) -> int:
+    """How many there are, roughly."""
+    eighths = np.round(picture[..., :3] * 8).astype(int)
+    return len(np.unique(eighths.reshape(-1, 3), axis=0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("trials", [1, 4])
+def test_the_window_shows_a_robot_that_moves(here, trials):
+    path = here / "replay.rrd"
+    assert replay([str(CHAMPION), "--trials", str(trials), "--save", str(path)]) == 0
+    with viewer(path, "1600x1000") as window:
+        state = window.state()
+        assert {"Arena", "Phase", "Summary"} <= {view.name for view in state.views}
+        pictures = [window.picture_at(seconds) for seconds in (6.0, 24.0)]
+        for picture in pictures:
+            assert colours(picture) > 100
+        changed = np.abs(pictures[1] - pictures[0]).max(axis=-1) > 0.1
+        assert changed.sum() > 1000
+        shown = []
+        for view in window.state().views:
+            assert not view.reports, f"{view.name}: {view.reports}"
+            picture = window.picture_of(view.view_id)
+            if picture is not None:
+                shown.append(view.name)
+                assert colours(picture) > BLANK, f"{view.name} is blank"
+        assert {"Arena", "Phase", "Clearance [mm]", "Cumulative fitness"} <= set(shown)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("trials", [1, 4])
+def test_every_view_shows_something_and_reports_nothing(here, trials, monkeypatch):
+    """Those in tabs as well: a viewer looks after what is in front only."""
+    monkeypatch.setattr(rrb, "Tabs", rrb.Grid)
+    path = here / "replay.rrd"
+    assert replay([str(CHAMPION), "--trials", str(trials), "--save", str(path)]) == 0
+    with viewer(path, "1600x1000" if trials == 1 else "2400x1500") as window:
+        window.state()
+        window.picture_at(24.0)
+        views = window.state().views
+        # two of all trials, and of each trial its plots
+        assert len(views) == (11 if trials == 1 else 3 + 3 + 8 * trials)
+        for view in views:
+            assert not view.reports, f"{view.name}: {view.reports}"
+            if trials == 1:
+                picture = window.picture_of(view.view_id)
+                assert picture is not None, f"{view.name} is not there"
+                if view.name == "Summary":
+                    # black on white, and a lot of it
+                    assert (picture[..., :3].max(axis=-1) < 0.7).mean() > 0.005
+                    continue
+                assert colours(picture) > BLANK, f"{view.name} is blank"
+
+
+@contextmanager
+def served(*argv: str) -> Iterator[tuple[subprocess.Popen, str]]:
+    """A process that serves a page, and the address that it says."""
+    process = subprocess.Popen(
+        [sys.executable, "-W", "error", "-m", "evolution.replay", *argv],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        for line in process.stdout:
+            found = re.search(r"served at (http://\S+/) until Ctrl-C$", line.rstrip())
+            if found:
+                yield process, found[1]
+                break
+        else:
+            pytest.fail(f"it serves nothing: {process.communicate()[1]}")
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def listeners(port: int) -> set[str]:
+    """Local addresses on which somebody listens on a port, as in /proc/net."""
+    found = set()
+    for name in ("tcp", "tcp6"):
+        place = Path("/proc/net") / name
+        rows = place.read_text().splitlines()[1:] if place.exists() else []
+        for row in rows:
+            _, local, _, state, *_ = row.split()
+            address, number = local.split(":")
+            if int(number, 16) == port and state == "0A":
+                found.add(address)
+    return found
+
+
+@pytest.mark.slow
+def test_the_page_is_served_to_this_machine_until_ctrl_c(here):
+    with served(str(CHAMPION), "--web", "pages/mine") as (process, address):
+        names = {path.name for path in (here / "pages/mine").iterdir()}
+        viewers = {"re_viewer.js", "re_viewer_bg.wasm"}
+        assert names == {"index.html", "page.js", "replay.rrd"} | viewers
+        host, port = re.findall(r"//(.*):(\d+)/", address)[0]
+        assert host == "127.0.0.1"
+        if sys.platform == "linux":
+            assert listeners(int(port)) == {"0100007F"}
+        process.send_signal(signal.SIGINT)
+        stdout, stderr = process.communicate(timeout=PATIENCE)
+        assert (process.returncode, stderr) == (0, "")
+        assert stdout.strip() == ""
+        # the folder stays, and can be published
+        assert {path.name for path in (here / "pages/mine").iterdir()} == names
+
+
+LOADED = """
+try {
+  const state = window.viewer.viewer_state();
+  return new TextDecoder("latin1").decode(state).includes("Recording:");
+} catch (error) {
+  return false;
+}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
+def test_the_page_shows_the_recording_and_calls_nobody(here):
+    with (
+        served(str(CHAMPION), "--trials", "2", "--web", "page") as (_, address),
+        browser(here / "profile") as window,
+    ):
+        window.open(f"{address}?renderer=webgl")
+        until(lambda: window.run(LOADED), PATIENCE)
+        assert window.run("return document.getElementById('status').textContent") == ""
+        assert not window.run("return window.viewer.has_panicked()")
+
+        def drawn():
+            return colours(imread(io.BytesIO(window.screenshot()))) > 20
+
+        until(drawn, PATIENCE)
+        asked = {url for url in window.requests() if url.startswith("http")}
+        assert {url.split("?")[0] for url in asked} == {
+            address + name
+            for name in (
+                "",
+                "re_viewer.js",
+                "re_viewer_bg.wasm",
+                "page.js",
+                "replay.rrd",
+            )
+        }
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
+def test_the_page_keeps_the_viewer_from_calling(here):
+    """Not the browser's settings do: whatever tries to call is stopped by the page."""
+    with (
+        served(str(CHAMPION), "--web", "page") as (_, address),
+        browser(here / "profile") as window,
+    ):
+        window.open(address)
+        script = """
+        window.stopped = [];
+        addEventListener("securitypolicyviolation",
+                         event => window.stopped.push(event.blockedURI));
+        for (const url of ["https://tel.rerun.io/", "http://127.0.0.1:9/"])
+          fetch(url).catch(() => null);
+        """
+        window.run(script)
+        stopped = until(
+            lambda: (
+                len(set(window.run("return window.stopped"))) >= 2
+                and window.run("return window.stopped")
+            ),
+            PATIENCE,
+        )
+        assert "http://127.0.0.1:9/" in stopped
