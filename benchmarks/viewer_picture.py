@@ -80,8 +80,10 @@ def viewer(recording: Path, size: tuple[int, int]) -> Iterator[ViewerClient]:
                 )
             try:
                 client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+                # it answers before it knows whether it can paint
+                client.take_screenshot()
                 state = client.get_state()
-            except (ConnectionError, RuntimeError, OSError):
+            except Exception:  # rerun's own have no common base
                 return None
             there = state.active_recording and state.views and not state.loading
             return client if there else None

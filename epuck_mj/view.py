@@ -196,7 +196,7 @@ def open_window(model: mujoco.MjModel, data: mujoco.MjData) -> Iterator[Any]:
         reason = re.sub(r"^\(\d+\) b'(.*)'$", r"\1", " ".join(str(problem).split()))
         raise UserError(
             f"cannot open a window ({reason}): expected a display with OpenGL; "
-            "without one, see python -m epuck_mj.render"
+            "without one, python -m evolution.replay draws pictures"
         ) from None
     try:
         yield window

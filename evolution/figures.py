@@ -3,10 +3,8 @@
 Figures are made as objects, never through pyplot: nothing global, no window.
 """
 
-import io
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib import colormaps
@@ -19,8 +17,6 @@ from numpy.typing import ArrayLike
 
 from epuck_mj import colors
 from epuck_mj.control import TaskParameters
-from epuck_mj.errors import UserError
-from epuck_mj.files import write_bytes
 from epuck_mj.model import Scene
 from epuck_mj.outline import shell_outline, wall_outlines
 from epuck_mj.trajectory import Trajectory
@@ -137,18 +133,3 @@ def _draw_trajectory(
     if trajectory.crashed:
         axes.plot(x, y, "x", color=VERMILION, ms=8, mew=2)
     return path
-
-
-def save_figure(figure: Figure, path: str | Path) -> None:
-    """Write a PNG at 150 dpi; equal figures make equal files.
-
-    Raises:
-        UserError: if it cannot be written.
-    """
-    picture = io.BytesIO()
-    # matplotlib would name its version
-    figure.savefig(picture, format="png", dpi=150, metadata={"Software": None})
-    try:
-        write_bytes(Path(path), picture.getvalue())
-    except OSError as error:
-        raise UserError(f"cannot write '{path}': {error.strerror}") from None

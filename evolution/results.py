@@ -9,13 +9,14 @@ import numpy as np
 from epuck_mj import files
 from epuck_mj.controller import ControllerFile
 from epuck_mj.model import Scene, load_scene
+from epuck_mj.pictures import save_figure
 from epuck_mj.recording import Trial, save_recording
 from epuck_mj.trajectory import record
 from evolution.champion import Champion, choose_champion, most_believed
 from evolution.config import ExperimentConfig
 from evolution.evaluation import BatchEngine
 from evolution.experiment import Experiment
-from evolution.figures import fitness_figure, save_figure, trajectory_figure
+from evolution.figures import fitness_figure, trajectory_figure
 from evolution.held_out import HeldOut, Judge
 from evolution.run_directory import RunDirectory
 

@@ -11,7 +11,7 @@ MODULES = sorted([*ROOT.glob("epuck_mj/**/*.py"), *ROOT.glob("evolution/**/*.py"
 LAYERS = [
     {"errors", "constants"},
     {"sensors", "motors", "fitness", "controller", "files", "command_line"},
-    {"control", "wall_follower", "model", "colors", "calibration"},
+    {"control", "wall_follower", "model", "colors", "calibration", "pictures"},
     {"simulation", "geometry", "disturbances"},
     {"disturbed_robots"},
     {"starts", "outline", "trajectory", "tracks", "clearance"},
@@ -60,9 +60,9 @@ ALLOWED_IN = {
     "imageio_ffmpeg": "epuck_mj/video.py",
     "matplotlib": (
         "epuck_mj/check/picture.py",
+        "epuck_mj/pictures.py",
         "evolution/figures.py",
         "evolution/gap/figure.py",
-        "evolution/replay/command.py",
         "evolution/report/figures/",
     ),
     "yaml": (

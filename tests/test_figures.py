@@ -13,10 +13,10 @@ from epuck_mj.control import TaskParameters
 from epuck_mj.errors import UserError
 from epuck_mj.model import load_scene
 from epuck_mj.outline import _outline, shell_outline, wall_outlines
+from epuck_mj.pictures import save_figure
 from epuck_mj.trajectory import record
 from evolution.figures import (
     fitness_figure,
-    save_figure,
     trajectory_figure,
 )
 

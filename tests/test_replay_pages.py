@@ -4,12 +4,10 @@ import io
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +16,9 @@ import rerun.blueprint as rrb
 from matplotlib.image import imread
 from rerun.experimental import ViewerClient
 
+from benchmarks.viewer_picture import picture, viewer
+from epuck_mj.errors import UserError
 from evolution.replay.command import replay
-from evolution.replay.viewer import viewer_binary
 from tests.browser import MISSING, browser, until
 
 ROOT = Path(__file__).parent.parent
@@ -49,84 +48,32 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-class Viewer:
-    """A viewer without a window."""
-
-    def __init__(self, client: ViewerClient):
-        self.client = client
-
-    def state(self):
-        """What is open, once everything has been loaded."""
-
-        def loaded():
-            state = self.client.get_state()
-            ready = state.active_recording and state.views and not state.loading
-            return state if ready else None
-
-        return until(loaded, PATIENCE)
-
-    def picture_at(self, seconds: float) -> np.ndarray:
-        """Of the whole window at a time, once it no longer changes."""
-        self.client.set_time("sim_time", duration=seconds, play_state="paused")
-        pictures: list[bytes] = []
-
-        # plots fill within a few frames
-        def settled():
-            pictures.append(self.client.take_screenshot())
-            return pictures[-1] in pictures[-2:-1]
-
-        until(settled, PATIENCE)
-        return imread(io.BytesIO(pictures[-1]))
-
-    def picture_of(self, view: str) -> np.ndarray | None:
-        """Of a view; None if it is behind a tab."""
-        try:
-            return imread(io.BytesIO(self.client.take_screenshot(view)))
-        except Exception as error:  # rerun's own have no common base
-            if "not found" not in str(error):
-                raise
-            return None
-
-
 @contextmanager
-def viewer(recording: Path, size: str) -> Iterator[Viewer]:
+def window(recording: Path, size: tuple[int, int]) -> Iterator[ViewerClient]:
     """A viewer of a recording; a reason to skip where no Vulkan driver is."""
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
-    said = recording.with_suffix(".log")
-    with said.open("w") as output:
-        process = subprocess.Popen(
-            [
-                *(viewer_binary(), recording, "--headless", "--bind", "127.0.0.1"),
-                *("--port", str(port), "--window-size", size),
-            ],
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=output,
-        )
-    try:
-        yield Viewer(_connected(process, said, port))
-    finally:
-        process.terminate()
-        process.wait(PATIENCE)
-
-
-def _connected(process: subprocess.Popen, said: Path, port: int) -> ViewerClient:
-    end = time.monotonic() + PATIENCE
-    while True:
+    with ExitStack() as stack:
         try:
-            client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
-            # it answers before it knows whether it can paint
-            client.take_screenshot()
-            return client
-        except Exception:  # rerun's own have no common base
-            if process.poll() is not None:
-                words = said.read_text()
-                if "Failed to get render context" in words:
-                    pytest.skip("no Vulkan driver here (Debian: mesa-vulkan-drivers)")
-                pytest.fail(f"the viewer ended: {words[:1000]}")
-            assert time.monotonic() < end, "the viewer does not answer"
-            time.sleep(0.1)
+            client = stack.enter_context(viewer(recording, size))
+        except UserError as error:
+            if "Vulkan" not in str(error):
+                raise
+            pytest.skip(str(error))
+        yield client
+
+
+def seen(client: ViewerClient, seconds: float) -> np.ndarray:
+    """The whole window at a time, once it no longer changes."""
+    return imread(io.BytesIO(picture(client, seconds)))
+
+
+def seen_of(client: ViewerClient, view: str) -> np.ndarray | None:
+    """A view; None if it is behind a tab."""
+    try:
+        return imread(io.BytesIO(client.take_screenshot(view)))
+    except Exception as error:  # rerun's own have no common base
+        if "not found" not in str(error):
+            raise
+        return None
 
 
 BLANK = 12
@@ -144,21 +91,21 @@ def colours(picture: np.ndarray) -> int:
 def test_the_window_shows_a_robot_that_moves(here, trials):
     path = here / "replay.rrd"
     assert replay([str(CHAMPION), "--trials", str(trials), "--save", str(path)]) == 0
-    with viewer(path, "1600x1000") as window:
-        state = window.state()
+    with window(path, (1600, 1000)) as client:
+        state = client.get_state()
         assert {"Arena", "Phase", "Summary"} <= {view.name for view in state.views}
-        pictures = [window.picture_at(seconds) for seconds in (6.0, 24.0)]
-        for picture in pictures:
-            assert colours(picture) > 100
+        pictures = [seen(client, seconds) for seconds in (6.0, 24.0)]
+        for whole in pictures:
+            assert colours(whole) > 100
         changed = np.abs(pictures[1] - pictures[0]).max(axis=-1) > 0.1
         assert changed.sum() > 1000
         shown = []
-        for view in window.state().views:
+        for view in client.get_state().views:
             assert not view.reports, f"{view.name}: {view.reports}"
-            picture = window.picture_of(view.view_id)
-            if picture is not None:
+            found = seen_of(client, view.view_id)
+            if found is not None:
                 shown.append(view.name)
-                assert colours(picture) > BLANK, f"{view.name} is blank"
+                assert colours(found) > BLANK, f"{view.name} is blank"
         assert {"Arena", "Phase", "Clearance [mm]", "Cumulative fitness"} <= set(shown)
 
 
@@ -169,22 +116,21 @@ def test_every_view_shows_something_and_reports_nothing(here, trials, monkeypatc
     monkeypatch.setattr(rrb, "Tabs", rrb.Grid)
     path = here / "replay.rrd"
     assert replay([str(CHAMPION), "--trials", str(trials), "--save", str(path)]) == 0
-    with viewer(path, "1600x1000" if trials == 1 else "2400x1500") as window:
-        window.state()
-        window.picture_at(24.0)
-        views = window.state().views
+    with window(path, (1600, 1000) if trials == 1 else (2400, 1500)) as client:
+        seen(client, 24.0)
+        views = client.get_state().views
         # two of all trials, and of each trial its plots
         assert len(views) == (11 if trials == 1 else 3 + 3 + 8 * trials)
         for view in views:
             assert not view.reports, f"{view.name}: {view.reports}"
             if trials == 1:
-                picture = window.picture_of(view.view_id)
-                assert picture is not None, f"{view.name} is not there"
+                found = seen_of(client, view.view_id)
+                assert found is not None, f"{view.name} is not there"
                 if view.name == "Summary":
                     # black on white, and a lot of it
-                    assert (picture[..., :3].max(axis=-1) < 0.7).mean() > 0.005
+                    assert (found[..., :3].max(axis=-1) < 0.7).mean() > 0.005
                     continue
-                assert colours(picture) > BLANK, f"{view.name} is blank"
+                assert colours(found) > BLANK, f"{view.name} is blank"
 
 
 @contextmanager

@@ -11,9 +11,10 @@ from pathlib import Path
 import tyro
 
 from epuck_mj.check import check_arena, report
-from epuck_mj.check.picture import region_figure, save_picture
+from epuck_mj.check.picture import region_figure
 from epuck_mj.command_line import main, parse
 from epuck_mj.model import SHIPPED_ROBOTS
+from epuck_mj.pictures import save_figure
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ def run(argv: Sequence[str]) -> int:
         print(line)
     if options.picture and checked.scene and checked.grid:
         figure = region_figure(checked.scene, checked.grid, checked.arena.stem)
-        save_picture(figure, options.picture)
+        save_figure(figure, options.picture, dpi=120)
         print(f"picture: {options.picture}")
     elif options.picture:
         print("no picture: there are no walls to draw")

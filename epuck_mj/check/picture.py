@@ -1,8 +1,5 @@
 """A picture of an arena from above: its walls, and where robots may start."""
 
-import io
-from pathlib import Path
-
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap
@@ -10,7 +7,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from epuck_mj.colors import GREEN, ORANGE
-from epuck_mj.files import write_bytes, writing
 from epuck_mj.model import Scene
 from epuck_mj.outline import shell_outline, wall_outlines
 from epuck_mj.starts import Grid
@@ -61,16 +57,3 @@ def region_figure(scene: Scene, grid: Grid, title: str) -> Figure:
     axes.set(title=title, xlabel="x [m]", ylabel="y [m]", aspect="equal")
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     return figure
-
-
-def save_picture(figure: Figure, path: Path) -> None:
-    """Write a PNG; equal figures make equal files.
-
-    Raises:
-        UserError: if it cannot be written.
-    """
-    picture = io.BytesIO()
-    # matplotlib would name its version
-    figure.savefig(picture, format="png", dpi=120, metadata={"Software": None})
-    with writing(path):
-        write_bytes(path, picture.getvalue())

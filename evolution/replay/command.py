@@ -1,6 +1,5 @@
 """The command line of replay: what to show, where, and as what."""
 
-import io
 import math
 import sys
 import webbrowser
@@ -14,7 +13,7 @@ from tqdm import tqdm
 
 from epuck_mj.command_line import command, parse
 from epuck_mj.errors import UserError
-from epuck_mj.files import write_bytes, writing
+from epuck_mj.files import writing
 from epuck_mj.geometry import arena_box
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.recording import Trial, save_recording
@@ -220,18 +219,14 @@ def _make_folder(path: Path) -> None:
 
 
 def _draw(path: Path, scene: Scene, trajectories: Sequence) -> None:
-    # OpenGL only for those who want it
-    from matplotlib.image import imsave
-
+    # OpenGL and matplotlib only for those who want them
+    from epuck_mj.pictures import save_pixels
     from epuck_mj.render import painter
 
     _make_folder(path)
     with painter(scene, trajectories, *IMAGE_SIZE) as artist:
         pixels = artist.picture()
-    picture = io.BytesIO()
-    imsave(picture, pixels, format="png", metadata={"Software": "epuck_mj"})
-    with writing(path.parent):
-        write_bytes(path, picture.getvalue())
+    save_pixels(pixels, path)
 
 
 def _film(path: Path, scene: Scene, trajectories: Sequence) -> None:
