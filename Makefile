@@ -5,7 +5,7 @@ INSTALLED := .venv/.installed
 RUN := runs/de-best-seed-1
 CHAMPION := results/paper/de-best/seed-1
 
-.PHONY: run test bench convergence racing overhead results figures clean
+.PHONY: run test bench convergence racing overhead bridge gap results figures clean
 
 run: $(INSTALLED)
 	@if [ -f $(RUN)/config.yaml ]; then \
@@ -31,6 +31,15 @@ racing: $(INSTALLED)
 
 overhead: $(INSTALLED)
 	$(BIN)/python -m benchmarks.study --json results/study.json
+
+# the bridge against the emulated robot, two minutes in real time; wants an idle machine
+bridge: $(INSTALLED)
+	$(BIN)/python -m benchmarks.bridge --json results/bridge.json
+
+# champions of the studies in pseudo-realities
+gap: $(INSTALLED)
+	$(BIN)/python -m evolution.gap results/paper results/transfer wall-follower \
+	  --output results/gap
 
 # what git keeps of the studies in runs/, and everything that is made of it
 results: $(INSTALLED)

@@ -19,15 +19,18 @@ from evolution.run_directory import RunDirectory
 from evolution.study_data import load_study
 from evolution.study_directory import StudyDirectory
 
-STUDIES = ("paper", "wheels")
+REPORTED = ("paper", "wheels")
 """Folders of runs/ and results/, and what stands between the README's markers."""
+
+TRANSFER = "transfer"
+"""The study of robots that differ; the gap measures it."""
 
 README = Path("README.md")
 
 
 @dataclass(frozen=True)
 class Options:
-    """Ship the finished runs of runs/paper and runs/wheels; to be called at the top.
+    """Ship the finished runs of the studies in runs/; to be called at the top.
 
     Without these folders, everything is made anew from what was shipped before.
     """
@@ -36,20 +39,24 @@ class Options:
 def publish(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
     parse(Options, "python -m benchmarks.publish", argv, Options())
-    for name in STUDIES:
+    for name in (*REPORTED, TRANSFER):
         if (Path("runs") / name).is_dir():
             ship(Path("runs") / name, Path("results") / name)
     paper, *others = (str(path) for path in shipped(Path("results")))
     wheels = [argument for path in others for argument in ("--wheels", path)]
     reproduce(["--study", paper, *wheels, "--output", "results"])
+    _write_readme()
+    return 0
+
+
+def _write_readme() -> None:
     text = with_tables(README.read_text(encoding="utf-8"), Path("results"))
     files.write_text(README, text)
-    return 0
 
 
 def shipped(results: Path) -> list[Path]:
     """The studies that are there."""
-    return [results / name for name in STUDIES if (results / name).is_dir()]
+    return [results / name for name in REPORTED if (results / name).is_dir()]
 
 
 def ship(source: Path, target: Path) -> None:
@@ -85,13 +92,19 @@ def with_tables(text: str, results: Path) -> str:
     Raises:
         UserError: if a marker is missing.
     """
-    for path in shipped(results):
-        begin, end = f"<!-- {path.name} -->\n", f"<!-- end of {path.name} -->"
+    tables = {
+        path.name: to_markdown([runs_table(load_study(path))])
+        for path in shipped(results)
+    }
+    gap = results / "gap" / "summary.md"
+    if gap.exists():
+        tables["gap"] = gap.read_text(encoding="utf-8")
+    for name, table in tables.items():
+        begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
         before, found, rest = text.partition(begin)
         _, closed, after = rest.partition(end)
         if not (found and closed):
             raise UserError(f"expected '{begin.strip()}' and '{end}' in the README")
-        table = to_markdown([runs_table(load_study(path))])
         text = before + begin + table + end + after
     return text
 

@@ -4,11 +4,12 @@ Plain arrays, drawn before a trial begins: so a trial in them can be repeated, a
 individuals of a generation can meet the same ones.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
 
+from epuck_mj.calibration import Calibration
 from epuck_mj.constants import N_PROXIMITY, PROXIMITY_PERIOD, TRACK, WHEEL_RADIUS
 
 N_WHEELS = 2
@@ -166,4 +167,28 @@ def draw(
         latency=rng.integers(ranges.latency[0], ranges.latency[1] + 1, n),
         mass=rng.uniform(*ranges.mass, n),
         friction=rng.uniform(*ranges.friction, n),
+    )
+
+
+def calibrated(
+    calibration: Calibration,
+    rng: np.random.Generator,
+    n: int,
+    steps: int,
+    noise: Noise,
+) -> Disturbances:
+    """Disturbances of `n` trials of one robot, of which we know in what it differs.
+
+    Args:
+        calibration: of that robot.
+        rng: where its noise comes from.
+        n: number of trials.
+        steps: control steps of a trial.
+        noise: how strong.
+    """
+    return replace(
+        draw(rng, n, steps, noise),
+        gains=np.tile(calibration.gains, (n, 1)),
+        wheel_gains=np.full((n, N_WHEELS), calibration.wheel_radius / WHEEL_RADIUS),
+        turn_gain=np.full(n, TRACK / calibration.track),
     )

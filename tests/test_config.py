@@ -66,7 +66,13 @@ BASELINES = {
 SHIPPED = PAPERS | BASELINES
 ON_REAL_ROBOTS = {
     "de-best-calibrated": {"noise": "calibrated"},
-    "de-best-randomised": {"noise": "calibrated", "randomise": True},
+    "de-best-randomised": {
+        "noise": "calibrated",
+        "randomise": True,
+        "trials": 8,
+        "v_max": 0.04,
+        "w_max": 1.0,
+    },
 }
 """DE/best again, under disturbances."""
 every_experiment = pytest.mark.parametrize("name", SHIPPED)

@@ -1,0 +1,183 @@
+"""The bridge against the emulated robot, in real time on a pty: `make bridge`.
+
+The emulator is a process of its own, the bridge this one; pyserial lies between them.
+Its closed loop is compared with two simulations, see `epuck_mj.bridge.fake.reference`:
+one at the same times, which shows that nothing is lost or changed on the way, and one
+with control steps all alike, which shows what a real robot's timing does to a path.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import tyro
+
+from epuck_mj.bridge.builds import BUILDS
+from epuck_mj.bridge.fake.body import Journal
+from epuck_mj.bridge.fake.reference import deviation, nominal, same_times
+from epuck_mj.bridge.link import Link, SerialPort
+from epuck_mj.bridge.robot import RealRobot
+from epuck_mj.bridge.serial_line import SerialLine
+from epuck_mj.bridge.session import Session
+from epuck_mj.calibration import Calibration
+from epuck_mj.control import Policy, TaskParameters
+from epuck_mj.controller import load
+from epuck_mj.files import read_arrays
+from epuck_mj.model import Scene, load_scene
+from epuck_mj.wall_follower import WallFollower
+
+ROBOTS = ("epuck", "epuck_planar")
+FIRMWARE = "asercom"
+START = (0.1, -0.2, 0.7)
+"""Pose: x, y [m], yaw [rad]; nothing is special about it."""
+
+START_TIME_MAX = 60.0
+"""An emulator that has no port by then [s] never gets one."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Measure the bridge.
+
+    Attributes:
+        json: file for the figures.
+        seconds: how long each robot drives.
+        champion: controller file; the wall follower written by hand if not given.
+    """
+
+    json: Path | None = None
+    seconds: float = 60.0
+    champion: Path | None = None
+
+
+def main(options: Options) -> None:
+    """Measure, print and write."""
+    task, policy = TaskParameters(), WallFollower()
+    if options.champion is not None:
+        file = load(options.champion)
+        task, policy = TaskParameters.from_dict(file.task), file.controller
+    results = {}
+    for robot in ROBOTS:
+        results[robot] = measure(robot, policy, task, options.seconds)
+        print(robot)
+        for name, value in results[robot].items():
+            print(f"  {name:36} {value:10.4g}")
+    if options.json is not None:
+        options.json.write_text(json.dumps(results, indent=1) + "\n")
+
+
+def measure(
+    robot: str, policy: Policy, task: TaskParameters, seconds: float
+) -> dict[str, float]:
+    """Figures of one drive."""
+    scene = load_scene(robot, "arena", task.control_step)
+    n_steps = round(seconds / task.control_step)
+    with tempfile.TemporaryDirectory() as folder:
+        port, file = Path(folder, "e-puck"), Path(folder, "journal.npz")
+        load_before = os.getloadavg()[0]
+        fake = _emulator(robot, port, file)
+        try:
+            with RealRobot(
+                SerialLine(Link(lambda: SerialPort(str(port)))),
+                Calibration(),
+                task.control_step,
+                start=START,
+            ) as real:
+                real.greet()
+                session = Session(task)
+                for _ in session.drive(real, policy, n_steps, time.monotonic):
+                    pass
+        finally:
+            fake.terminate()
+            fake.communicate(timeout=30)
+        journal = read_journal(file)
+    poses = np.array(journal.pose)
+    start = np.array(START)
+    same = same_times(scene, policy, task, start, journal, BUILDS[FIRMWARE].timer)
+    there = deviation(same, poses[: len(same)])
+    paced = at_control_steps(scene, journal, n_steps)
+    plain = nominal(scene, policy, task, start, n_steps)[: len(paced)]
+    undisturbed = deviation(paced, plain)
+    by_odometry = np.array([step.moment.pose for step in session.steps])
+    drift = np.linalg.norm(by_odometry[-1, :2] - poses[len(same) - 1, :2])
+    latency = np.array([step.moment.latency for step in session.steps])
+    compute = np.array([step.compute for step in session.steps])
+    return {
+        "control_steps": len(session.steps),
+        "overruns": real.schedule.n_overruns,
+        "resynchronisations": real.n_repairs,
+        "latency_median_ms": 1000 * float(np.median(latency)),
+        "latency_p95_ms": 1000 * float(np.percentile(latency, 95)),
+        "latency_max_ms": 1000 * float(latency.max()),
+        "compute_p95_ms": 1000 * float(np.percentile(compute, 95)),
+        "compute_max_ms": 1000 * float(compute.max()),
+        "same_times_mm": 1000 * there[0],
+        "same_times_deg": float(np.degrees(there[1])),
+        "commands_off_beat": off_beat(scene, journal),
+        "nominal_mm": 1000 * undisturbed[0],
+        "nominal_deg": float(np.degrees(undisturbed[1])),
+        "odometry_drift_mm": 1000 * float(drift),
+        "path_m": real.odometry.length,
+        "load_average_before": load_before,
+        "cores": os.cpu_count() or 1,
+    }
+
+
+def read_journal(path: Path) -> Journal:
+    """What an emulated robot did."""
+    arrays = read_arrays(path)
+    return Journal(
+        **{name: list(rows) for name, rows in arrays.items() if name != "timestep"}
+    )
+
+
+def at_control_steps(scene: Scene, journal: Journal, n_steps: int) -> np.ndarray:
+    """Poses `(n, 3)` from the first command on, a control step apart."""
+    driven = [
+        step
+        for step, row in zip(journal.command_step, journal.command, strict=True)
+        if row[0] or row[2]
+    ]
+    poses = np.array(journal.pose)[driven[0] :: scene.n_substeps]
+    return poses[: n_steps + 1]
+
+
+def off_beat(scene: Scene, journal: Journal) -> int:
+    """Commands that did not come whole control steps after the one before.
+
+    In physics steps: one early or late is enough to make another path of it.
+    """
+    rows = zip(journal.command_step, journal.command, strict=True)
+    driven = [step for step, row in rows if row[0] or row[2]]
+    return int(np.count_nonzero(np.diff(driven) % scene.n_substeps))
+
+
+def _emulator(robot: str, port: Path, journal: Path) -> subprocess.Popen:
+    """An emulated robot that is there."""
+    pose = [str(START[0]), str(START[1]), str(np.degrees(START[2]))]
+    fake = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "epuck_mj.bridge.fake", "--robot", robot),
+            *("--firmware", FIRMWARE, "--link", str(port), "--pose", *pose),
+            *("--journal", str(journal)),
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + START_TIME_MAX
+    while not port.is_symlink():
+        if fake.poll() is not None or time.monotonic() > deadline:
+            fake.kill()
+            raise RuntimeError("the emulated robot did not start")
+        time.sleep(0.05)
+    return fake
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Options))

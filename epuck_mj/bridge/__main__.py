@@ -1,0 +1,136 @@
+"""A policy drives a real robot: `python -m epuck_mj.bridge CHAMPION --port PORT`."""
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import tyro
+
+from epuck_mj.bridge.connection import Connection
+from epuck_mj.bridge.link import Link, SerialPort, ports
+from epuck_mj.bridge.log import log_name
+from epuck_mj.bridge.mission import Mission, accomplish
+from epuck_mj.bridge.protocol import RESYNC, ascii, packets
+from epuck_mj.bridge.serial_line import SerialLine
+from epuck_mj.bridge.wifi_line import WifiLine
+from epuck_mj.calibration import Calibration
+from epuck_mj.command_line import main, parse
+from epuck_mj.constants import SPEED_MAX, WIFI_PORT
+from epuck_mj.control import Policy, TaskParameters
+from epuck_mj.controller import load
+from epuck_mj.errors import UserError
+from epuck_mj.model import load_scene
+from epuck_mj.wall_follower import WallFollower
+
+MODULE = "epuck_mj.bridge"
+WIFI = "tcp://"
+YARDSTICK = "wall-follower"
+SECONDS_MAX = 24 * 3600
+
+
+@dataclass(frozen=True)
+class Options:
+    """Let a controller drive a real e-puck, and stop it whatever happens.
+
+    Attributes:
+        champion: controller file, or wall-follower, the one written by hand.
+        port: of the robot: /dev/rfcomm0, COM5, socket://host:port; of an e-puck2 over
+            WiFi tcp://host:1000.
+        seconds: how long it drives [s].
+        calibrate: first let the robot set its sensors' zero; nothing may be near it.
+        calibration: file on in what this robot differs from others.
+        pose: where it starts, x and y [m] and direction [degrees], for the log.
+        max_speed: no wheel rolls faster than this [m/s]; if not given, as fast as any.
+        dry_run: read and decide, but let the robot stand still.
+        arena: to show the log in; the one the champion evolved in if not given.
+        log: name of the log, written as .npz and .rrd; in runs/ if not given.
+        list_ports: only list the serial ports of this computer.
+    """
+
+    champion: tyro.conf.Positional[str] = ""
+    port: str = ""
+    seconds: float = 60.0
+    calibrate: bool = False
+    calibration: Path | None = None
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    max_speed: float | None = None
+    dry_run: bool = False
+    arena: str | None = None
+    log: Path | None = None
+    list_ports: bool = False
+
+
+def bridge(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status.
+
+    Raises:
+        UserError: for anything the user can put right.
+    """
+    options = parse(Options, f"python -m {MODULE}", argv)
+    if options.list_ports:
+        for name, description in ports():
+            print(f"{name}  {description}")
+        return 0
+    _check(options)
+    policy, task, robot, arena = _champion(options.champion)
+    calibration = options.calibration
+    x, y, degrees = options.pose
+    mission = Mission(
+        policy=policy,
+        task=task,
+        scene=load_scene(robot, options.arena or arena, task.control_step),
+        calibration=Calibration.load(calibration) if calibration else Calibration(),
+        n_steps=max(1, round(options.seconds / task.control_step)),
+        start=(x, y, math.radians(degrees)),
+        speed_max=options.max_speed or float("inf"),
+        dry_run=options.dry_run,
+        calibrate=options.calibrate,
+        log=log_name(options.log),
+    )
+    return accomplish(mission, lambda: _connect(options.port), time.monotonic)
+
+
+def _connect(port: str) -> Connection:
+    if port.startswith(WIFI):
+        name = f"socket://{port.removeprefix(WIFI)}"
+        if not urlsplit(name).netloc.rpartition("]")[2].count(":"):
+            name += f":{WIFI_PORT}"
+        return WifiLine(lambda: SerialPort(name, packets.command(0, 0)))
+    farewell = RESYNC.flush + ascii.stop().out
+    return SerialLine(Link(lambda: SerialPort(port, farewell)))
+
+
+def _check(options: Options) -> None:
+    if not options.champion:
+        raise UserError(f"expected a controller file or {YARDSTICK}")
+    if not options.port:
+        raise UserError("expected --port; --list-ports shows what there is")
+    if not 0 < options.seconds <= SECONDS_MAX:
+        raise UserError(
+            f"expected --seconds above 0, up to {SECONDS_MAX}, got {options.seconds}"
+        )
+    if options.max_speed is not None and not 0 < options.max_speed <= SPEED_MAX:
+        raise UserError(
+            f"expected --max-speed above 0, up to {SPEED_MAX:.4f} m/s, "
+            f"got {options.max_speed}"
+        )
+    if not all(map(math.isfinite, options.pose)):
+        raise UserError(f"expected --pose of finite numbers, got {options.pose}")
+
+
+def _champion(name: str) -> tuple[Policy, TaskParameters, str, str]:
+    """A policy, its task, the robot and arena it is for."""
+    if name == YARDSTICK:
+        return WallFollower(), TaskParameters(), "epuck", "arena"
+    file = load(name)
+    robot, arena = (file.scene.get(key) for key in ("robot", "arena"))
+    if not isinstance(robot, str) or not isinstance(arena, str):
+        raise UserError(f"'{name}' does not say which robot and arena it is for")
+    return file.controller, TaskParameters.from_dict(file.task), robot, arena
+
+
+if __name__ == "__main__":
+    main(bridge)

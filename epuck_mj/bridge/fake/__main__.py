@@ -1,0 +1,133 @@
+"""An emulated e-puck to try the bridge on: `python -m epuck_mj.bridge.fake`."""
+
+import math
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from epuck_mj.bridge.fake.body import MujocoBody
+from epuck_mj.bridge.fake.emulator import WIFI, Emulator
+from epuck_mj.bridge.fake.endpoints import Endpoint, Pty, Tcp, serve
+from epuck_mj.bridge.fake.scenarios import random_scenario, scenario
+from epuck_mj.bridge.interruption import Interrupted, Interruption
+from epuck_mj.command_line import main, parse
+from epuck_mj.errors import UserError
+from epuck_mj.model import load_scene
+
+MODULE = "epuck_mj.bridge.fake"
+RANDOM = "random"
+RANDOM_END = 10.0
+"""No fault of a random scenario starts later than this [s]."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """An e-puck that lives in MuJoCo behind a serial port, until Ctrl-C.
+
+    Attributes:
+        arena: shipped arena, or path of an MJCF with walls.
+        robot: shipped robot, or path of an MJCF.
+        pose: where it starts, x and y [m] and direction [degrees].
+        firmware: asercom, btcom or epuck2.
+        link: name of its pseudo-terminal, a symbolic link; in a temporary folder if
+            not given.
+        tcp: speak on this TCP port instead, as socket://127.0.0.1:PORT; 0 is any.
+        wifi: be an e-puck2 that speaks its packets on this TCP port; 0 is any.
+        scenario: what goes wrong, as in stall@2,loss@4+1, or random: loss, garbage,
+            noise, stall, disconnect, gone, reset, at a time since the first byte [s].
+        seed: of random scenarios, garbage and lost bytes.
+        latency: of each way [s], beside the UART's.
+        speed: how many times faster than real its time goes by.
+        journal: file for all that it did, an .npz.
+    """
+
+    arena: str = "arena"
+    robot: str = "epuck"
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    firmware: str = "asercom"
+    link: Path | None = None
+    tcp: int | None = None
+    wifi: int | None = None
+    scenario: str = ""
+    seed: int = 0
+    latency: float = 0.0
+    speed: float = 1.0
+    journal: Path | None = None
+
+
+def fake(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status.
+
+    Raises:
+        UserError: for anything the user can put right.
+    """
+    options = parse(Options, f"python -m {MODULE}", argv)
+    _check(options)
+    faults = (
+        random_scenario(options.seed, RANDOM_END)
+        if options.scenario == RANDOM
+        else scenario(options.scenario)
+    )
+    scene = load_scene(options.robot, options.arena)
+    x, y, degrees = options.pose
+    origin = time.monotonic()
+
+    def clock() -> float:
+        return (time.monotonic() - origin) * options.speed
+
+    body = MujocoBody(scene, np.array([x, y, math.radians(degrees)]), clock())
+    robot = options.firmware if options.wifi is None else WIFI
+    emulator = Emulator(body, robot, clock(), faults, options.latency, options.seed)
+    with Interruption() as interruption, tempfile.TemporaryDirectory() as folder:
+        endpoint = _endpoint(options, Path(folder))
+        try:
+            with interruption.raising():
+                if faults:
+                    print(f"scenario: {','.join(map(str, faults))}")
+                print(f"port: {endpoint.name}", flush=True)
+                serve(emulator, endpoint, clock, lambda: True)
+        except Interrupted:
+            pass
+        finally:
+            endpoint.close()
+    if options.journal is not None:
+        body.journal.save(options.journal, scene.model.opt.timestep)
+    state = "standing" if body.standing else "still driving"
+    x, y, yaw = body.pose
+    print(f"{state}, x {x:.4f} m, y {y:.4f} m, yaw {math.degrees(yaw):.2f} degrees")
+    return 0
+
+
+def _endpoint(options: Options, folder: Path) -> Endpoint:
+    if options.wifi is not None:
+        return Tcp(options.wifi)
+    if options.tcp is not None:
+        return Tcp(options.tcp)
+    return Pty(options.link or folder / "e-puck")
+
+
+def _check(options: Options) -> None:
+    if sum(x is not None for x in (options.link, options.tcp, options.wifi)) > 1:
+        raise UserError("expected one of --link, --tcp and --wifi")
+    if options.link is None and options.tcp is None and options.wifi is None:
+        _check_terminals()
+    if not 0 < options.speed <= 1000:
+        raise UserError(f"expected --speed above 0, up to 1000, got {options.speed}")
+    if not 0 <= options.latency <= 1:
+        raise UserError(f"expected --latency from 0 to 1 s, got {options.latency}")
+    if not all(map(math.isfinite, options.pose)):
+        raise UserError(f"expected --pose of finite numbers, got {options.pose}")
+
+
+def _check_terminals() -> None:
+    if sys.platform == "win32":
+        raise UserError("this system has no pseudo-terminals: use --tcp")
+
+
+if __name__ == "__main__":
+    main(fake)

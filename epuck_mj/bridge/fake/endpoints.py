@@ -1,0 +1,249 @@
+"""Where a host finds an emulated robot: a pseudo-terminal or a TCP port, in real time.
+
+Both serve one host at a time, on this computer only, and vanish and return with the
+scenario.
+"""
+
+import contextlib
+import os
+import select
+import socket
+import tty
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+from epuck_mj.bridge.fake.emulator import Emulator
+from epuck_mj.errors import UserError
+
+LOCALHOST = "127.0.0.1"
+
+IDLE_TIME, BUSY_TIME = 0.004, 0.0005
+"""How long it sleeps when nothing, or something, is under way [s]."""
+
+READ_MAX = 4096
+
+
+class Endpoint(Protocol):
+    """Where bytes come in and go out.
+
+    Attributes:
+        is_open: whether a host can open it.
+    """
+
+    is_open: bool
+
+    @property
+    def name(self) -> str:
+        """By which a host opens it."""
+        ...
+
+    def open(self) -> None:
+        """Appear."""
+        ...
+
+    def close(self) -> None:
+        """Vanish."""
+        ...
+
+    def handles(self) -> list[int]:
+        """File descriptors on which something may come."""
+        ...
+
+    def receive(self) -> bytes:
+        """What came; does not wait."""
+        ...
+
+    def send(self, data: bytes) -> None:
+        """Give the host what it takes; the rest is lost, as is all if it is away."""
+        ...
+
+
+class Pty:
+    """A pseudo-terminal with a name that stays the same; see Endpoint."""
+
+    def __init__(self, link: Path) -> None:
+        """Appear.
+
+        Args:
+            link: its name, a symbolic link.
+
+        Raises:
+            UserError: if that cannot be made.
+        """
+        self._link = link
+        self.is_open = False
+        try:
+            self.open()
+        except OSError as error:
+            raise UserError(f"cannot make '{link}': {error.strerror}") from None
+
+    @property
+    def name(self) -> str:
+        """See Endpoint."""
+        return str(self._link)
+
+    def open(self) -> None:
+        """See Endpoint."""
+        self._master, self._slave = os.openpty()
+        # nothing is echoed or changed, even before a host says so
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.is_open = True
+        try:
+            self._link.symlink_to(os.ttyname(self._slave))
+        except OSError:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """See Endpoint."""
+        if not self.is_open:
+            return
+        self.is_open = False
+        if self._link.is_symlink():
+            self._link.unlink()
+        os.close(self._master)
+        os.close(self._slave)
+
+    def handles(self) -> list[int]:
+        """See Endpoint."""
+        return [self._master] if self.is_open else []
+
+    def receive(self) -> bytes:
+        """See Endpoint."""
+        with contextlib.suppress(BlockingIOError):
+            return os.read(self._master, READ_MAX)
+        return b""
+
+    def send(self, data: bytes) -> None:
+        """See Endpoint."""
+        with contextlib.suppress(BlockingIOError):
+            os.write(self._master, data)
+
+
+class Tcp:
+    """A TCP port on this computer; see Endpoint."""
+
+    def __init__(self, port: int) -> None:
+        """Appear.
+
+        Args:
+            port: its number; 0 takes any that is free.
+
+        Raises:
+            UserError: if somebody else has it.
+        """
+        self._port = port
+        self._host: socket.socket | None = None
+        self.is_open = False
+        try:
+            self.open()
+        except (OSError, OverflowError) as error:
+            raise UserError(f"cannot listen on port {port}: {error}") from None
+
+    @property
+    def name(self) -> str:
+        """See Endpoint."""
+        return f"socket://{LOCALHOST}:{self._port}"
+
+    @property
+    def port(self) -> int:
+        """The port's number."""
+        return self._port
+
+    def open(self) -> None:
+        """See Endpoint."""
+        self._server = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        try:
+            self._server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            self._server.bind((LOCALHOST, self._port))
+            self._server.listen(1)
+        except BaseException:
+            self._server.close()
+            raise
+        self._server.setblocking(False)
+        # the same again after it vanished
+        self._port = self._server.getsockname()[1]
+        self.is_open = True
+
+    def close(self) -> None:
+        """See Endpoint."""
+        if not self.is_open:
+            return
+        self.is_open = False
+        self._drop()
+        self._server.close()
+
+    def handles(self) -> list[int]:
+        """See Endpoint."""
+        if not self.is_open:
+            return []
+        # others wait in the queue until this one has gone
+        return [(self._host or self._server).fileno()]
+
+    def receive(self) -> bytes:
+        """See Endpoint."""
+        if self._host is None:
+            with contextlib.suppress(BlockingIOError):
+                self._host, _ = self._server.accept()
+                self._host.setblocking(False)
+                self._host.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            return b""
+        try:
+            data = self._host.recv(READ_MAX)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            data = b""
+        if not data:
+            self._drop()
+        return data
+
+    def send(self, data: bytes) -> None:
+        """See Endpoint."""
+        if self._host is None:
+            return
+        try:
+            self._host.send(data)
+        except BlockingIOError:
+            pass
+        except OSError:
+            self._drop()
+
+    def _drop(self) -> None:
+        if self._host is not None:
+            self._host.close()
+            self._host = None
+
+
+def serve(
+    emulator: Emulator,
+    endpoint: Endpoint,
+    clock: Callable[[], float],
+    wanted: Callable[[], bool],
+) -> None:
+    """Let a robot live behind an endpoint, which is closed in the end.
+
+    Args:
+        emulator: the robot.
+        endpoint: open.
+        clock: the robot's time [s].
+        wanted: asked all the time whether to go on.
+    """
+    try:
+        while wanted():
+            pause = BUSY_TIME if emulator.busy else IDLE_TIME
+            ready = select.select(endpoint.handles(), [], [], pause)[0]
+            heard = endpoint.receive() if ready else b""
+            now = clock()
+            said = emulator.exchange(heard, now)
+            if said and endpoint.is_open:
+                endpoint.send(said)
+            connected = emulator.connected(now)
+            if connected and not endpoint.is_open:
+                endpoint.open()
+            elif not connected and endpoint.is_open:
+                endpoint.close()
+    finally:
+        endpoint.close()

@@ -1,0 +1,80 @@
+"""A process that outlives a bridge which was killed, to stop its robot.
+
+It shares the bridge's open port and says nothing, until the pipe from the bridge ends.
+If a byte came before that, the bridge is done; if not, it died, by `kill -9` or a
+crash: then the guardian sends what stops the robot, several times.
+
+Run by its path, with nothing but the standard library: it has to be there at once.
+"""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+
+N_TIMES, PERIOD = 5, 0.2
+"""How often it says so, and the time in between [s]: bytes may be lost."""
+
+DONE = b"."
+"""What a bridge says that needs no guardian any more."""
+
+
+PATIENCE = 2.0
+"""A guardian that does not go by then is killed [s]. Chosen."""
+
+
+def hire(port: int, farewell: bytes) -> subprocess.Popen | None:
+    """A guardian; None if there is nothing to say, or on Windows.
+
+    Args:
+        port: file descriptor of the robot's port.
+        farewell: bytes that stop the robot, whatever it heard before.
+    """
+    if not farewell or os.name != "posix":
+        return None
+    return subprocess.Popen(
+        [sys.executable, "-I", "-S", __file__, str(port), farewell.hex()],
+        stdin=subprocess.PIPE,
+        pass_fds=[port],
+        # Ctrl-C on a terminal is for the bridge
+        start_new_session=True,
+    )
+
+
+def dismiss(process: subprocess.Popen | None) -> None:
+    """Let a guardian go; it lets go of the port."""
+    if process is None or process.returncode is not None:
+        return
+    try:
+        process.communicate(DONE, timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
+
+
+def guard(pipe: int, port: int, farewell: bytes) -> bool:
+    """Wait for the bridge's end; whether it needed us.
+
+    Args:
+        pipe: file descriptor that ends with the bridge.
+        port: file descriptor of the robot's port.
+        farewell: bytes that stop the robot, whatever it heard before.
+    """
+    if os.read(pipe, len(DONE)) == DONE:
+        return False
+    for _ in range(N_TIMES):
+        # a robot that cannot be reached now, perhaps can a little later
+        with contextlib.suppress(OSError):
+            os.write(port, farewell)
+        time.sleep(PERIOD)
+    return True
+
+
+if __name__ == "__main__":
+    # what ends a bridge must not end its guardian
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    guard(0, int(sys.argv[1]), bytes.fromhex(sys.argv[2]))

@@ -1,0 +1,76 @@
+"""Ctrl-C, kill and a closed terminal: one exception, and only where it may be raised.
+
+What stops the motors must not be broken off half-way, not even by a first signal that
+comes while it runs. So signals raise inside `raising` only; elsewhere they are noted.
+"""
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Any, Self
+
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
+"""Ctrl-C, kill, a terminal that closes, Ctrl-Backslash: where the system has them."""
+
+SIGNALS = tuple(getattr(signal, name) for name in NAMES if hasattr(signal, name))
+
+
+class Interrupted(BaseException):
+    """A person or the system wants an end."""
+
+
+class Interruption:
+    """The signals' handler while its `with` block lasts.
+
+    Attributes:
+        signum: the first signal that came; None if none did.
+    """
+
+    def __init__(self) -> None:
+        """Nothing came, nothing is handled."""
+        self.signum: signal.Signals | None = None
+        self._raises = False
+        self._previous: dict[signal.Signals, Any] = {}
+
+    def __enter__(self) -> Self:
+        """Handle the signals."""
+        for signum in SIGNALS:
+            self._previous[signum] = signal.signal(signum, self._handle)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Leave them to who handled them before; if one came, to nobody.
+
+        Then the process is at its end, whose status must say so.
+        """
+        for signum, handler in self._previous.items():
+            ended = self.signum is not None
+            signal.signal(signum, signal.SIG_IGN if ended else handler)
+
+    @contextmanager
+    def raising(self) -> Iterator[None]:
+        """In this block a signal raises `Interrupted`, once; also one that came before.
+
+        Raises:
+            Interrupted: for the first signal.
+        """
+        try:
+            self._raises = True
+            if self.signum is not None:
+                raise Interrupted
+            yield
+        finally:
+            self._raises = False
+
+    def _handle(self, signum: int, frame: object) -> None:
+        if self.signum is None:
+            self.signum = signal.Signals(signum)
+        if self._raises:
+            self._raises = False
+            raise Interrupted

@@ -1,0 +1,68 @@
+"""The operator's key: a terminal's keys one by one, without Enter.
+
+Where standard input is no terminal, nobody can press a key.
+"""
+
+import os
+import select
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+try:
+    import termios
+    import tty
+except ImportError:
+    # Windows: its terminals have no such modes
+    termios = tty = None
+
+STOP_KEYS = b"q "
+
+
+class Keyboard:
+    """Keys of a terminal, or of none."""
+
+    def __init__(self, handle: int | None) -> None:
+        """Of the terminal with that file descriptor; None is no terminal."""
+        self._handle = handle
+
+    @property
+    def there(self) -> bool:
+        """Whether there are any keys."""
+        return self._handle is not None
+
+    def stop_wanted(self) -> bool:
+        """Whether a stop key was pressed since the last call; does not wait."""
+        if self._handle is None:
+            return False
+        wanted = False
+        while select.select([self._handle], [], [], 0)[0]:
+            keys = _read(self._handle)
+            if not keys:
+                # the terminal has gone
+                self._handle = None
+                break
+            wanted |= any(key in keys for key in STOP_KEYS)
+        return wanted
+
+
+@contextmanager
+def keyboard() -> Iterator[Keyboard]:
+    """The keys of standard input while the block lasts; then Enter is needed again."""
+    if not (termios and tty) or sys.stdin is None or not sys.stdin.isatty():
+        yield Keyboard(None)
+        return
+    handle = sys.stdin.fileno()
+    before = termios.tcgetattr(handle)
+    try:
+        tty.setcbreak(handle)
+        yield Keyboard(handle)
+    finally:
+        termios.tcsetattr(handle, termios.TCSADRAIN, before)
+
+
+def _read(handle: int) -> bytes:
+    try:
+        return os.read(handle, 64)
+    except OSError:
+        return b""

@@ -1,0 +1,322 @@
+"""The link to a robot: requests out, replies in, on a port that may fail at any time.
+
+One request is in flight at a time, and every wait ends at a time that the caller sets.
+A link whose last request was not answered is out of step and asks nothing before it
+went through `protocol.RESYNC`. The only `import serial`.
+"""
+
+import errno
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+import serial
+from serial.tools import list_ports
+
+from epuck_mj.bridge import guardian
+from epuck_mj.bridge.connection import Clock, Port
+from epuck_mj.bridge.errors import BridgeError, LinkLost, NoReply, RobotRestarted
+from epuck_mj.bridge.protocol import RESYNC, Request, greets
+from epuck_mj.constants import BAUD_RATE
+from epuck_mj.errors import UserError
+
+T = TypeVar("T")
+
+POLL_TIME = 0.01
+"""How long one look at a port waits for its first byte [s]."""
+
+WRITE_TIME_MAX = 0.5
+"""A port that takes no bytes for this long is lost [s]. Chosen."""
+
+READ_MAX = 4096
+"""Most bytes read at once."""
+
+REOPEN_PERIOD = 0.1
+"""Time between two attempts to open a lost port [s]. Chosen."""
+
+
+class SerialPort:
+    """A port of pyserial: `/dev/rfcomm0`, `COM5` or `socket://host:port`."""
+
+    def __init__(self, name: str, farewell: bytes = b"") -> None:
+        """Open it; nobody else may have it.
+
+        Args:
+            name: of the port.
+            farewell: bytes that a guardian sends if this process dies with the port
+                open; nothing needs none. Windows has no guardians.
+
+        Raises:
+            UserError: if that is not possible; says why.
+        """
+        self.name = name
+        try:
+            self._serial = serial.serial_for_url(
+                name,
+                baudrate=BAUD_RATE,
+                timeout=POLL_TIME,
+                write_timeout=WRITE_TIME_MAX,
+                exclusive=True,
+            )
+        except (OSError, ValueError, TypeError) as error:
+            raise UserError(_why(name, error)) from None
+        self._guardian = guardian.hire(self._serial.fileno(), farewell)
+
+    def send(self, data: bytes) -> None:
+        """See Port."""
+        try:
+            self._serial.write(data)
+        except OSError as error:
+            raise self._lost(error) from None
+
+    def receive(self, timeout: float) -> bytes:
+        """See Port; a wait is at most POLL_TIME long, whatever the timeout."""
+        try:
+            # pyserial waits for as many bytes as one asks for
+            data = self._serial.read(1) if timeout > 0 else b""
+            if self._serial.in_waiting:
+                # and of a socket it does not know how many there are
+                self._serial.timeout = 0
+                data += self._serial.read(READ_MAX)
+                self._serial.timeout = POLL_TIME
+        except (OSError, TypeError, ValueError) as error:
+            raise self._lost(error) from None
+        return bytes(data)
+
+    def close(self) -> None:
+        """See Port."""
+        guardian.dismiss(self._guardian)
+        # pyserial forgets to close the socket of a peer that has gone
+        socket = getattr(self._serial, "_socket", None)
+        try:
+            self._serial.close()
+        except OSError:
+            pass
+        finally:
+            if socket is not None:
+                socket.close()
+
+    def _lost(self, error: Exception) -> LinkLost:
+        return LinkLost(f"a robot at '{self.name}'", f"'{_one_line(error)}'")
+
+
+class Link:
+    """A conversation with a robot on a serial line.
+
+    Attributes:
+        clock: what all times are told by [s].
+        in_step: whether the last request was answered, and nothing else came.
+    """
+
+    def __init__(
+        self,
+        open_port: Callable[[], Port],
+        clock: Clock = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Open the port.
+
+        Args:
+            open_port: opens it, and again if it was lost.
+            clock: what all times are told by.
+            sleep: lets so many seconds go by.
+
+        Raises:
+            UserError: if the port cannot be opened.
+        """
+        self.clock = clock
+        self._sleep = sleep
+        self._open_port = open_port
+        self._port: Port | None = open_port()
+        self.in_step = False
+        self._rest = b""
+        self._unanswered = False
+
+    @property
+    def lost(self) -> bool:
+        """Whether the port has to be opened again."""
+        return self._port is None
+
+    def close(self) -> None:
+        """Let go of the port."""
+        if self._port is not None:
+            self._port.close()
+            self._port = None
+
+    def reopen(self, until: float) -> None:
+        """Open the lost port as soon as it is there again.
+
+        Args:
+            until: when to give up, by the clock.
+
+        Raises:
+            LinkLost: if it does not come back.
+        """
+        self.close()
+        self.in_step, self._rest, self._unanswered = False, b"", False
+        while True:
+            try:
+                self._port = self._open_port()
+                return
+            except UserError as error:
+                if self.clock() >= until:
+                    raise LinkLost("the port to come back", str(error)) from None
+            self._sleep(REOPEN_PERIOD)
+
+    def ask(self, request: Request[T], until: float = float("inf")) -> T:
+        """The reply to a request.
+
+        Args:
+            request: what to ask.
+            until: when to give up, by the clock, if the request's own patience does
+                not end before.
+
+        Raises:
+            BridgeError: if the reply does not come, or something else does; the link
+                then is out of step.
+            RobotRestarted: if the robot was reset.
+            LinkLost: if the port is gone.
+        """
+        binary = request.out.endswith(b"\0")
+        stale = self._rest + self._receive(0.0)
+        self._rest = b""
+        if not self.in_step:
+            raise BridgeError("host and robot in step", stale or "an open question")
+        # until the reply is here, whatever happens, a signal included
+        self.in_step = False
+        if greets(stale):
+            raise RobotRestarted(f"silence before {request.name}", stale)
+        if stale and binary:
+            raise BridgeError(f"silence before {request.name}", stale)
+        parser, came = request.parser(), b""
+        deadline = min(self.clock() + request.patience, until)
+        self._send(request.out)
+        while (now := self.clock()) < deadline:
+            data = self._receive(deadline - now)
+            if not data:
+                continue
+            reply = parser.feed(data)
+            if reply is not None:
+                self._rest = parser.rest
+                self.in_step = True
+                return reply
+            came += data
+            if binary:
+                # bytes come without a pause: the rest of them was lost
+                deadline = min(self.clock() + RESYNC.quiet, until)
+        raise NoReply(f"a reply to {request.name} in time", came or "nothing")
+
+    def resync(self, until: float) -> bool:
+        """Find each other again; what the robot had heard of has been carried out.
+
+        Args:
+            until: when to give up, by the clock.
+
+        Returns:
+            Whether the robot's banner came: it was reset.
+
+        Raises:
+            BridgeError: if there is nobody who answers as an e-puck.
+            LinkLost: if the port is gone.
+        """
+        restarted, came = False, b""
+        while True:
+            self.in_step = False
+            self._send(RESYNC.flush)
+            dropped = self._rest + self.drain(until)
+            self._rest = b""
+            restarted |= greets(dropped)
+            came = dropped or came
+            if self.clock() >= until:
+                raise NoReply("an e-puck that answers V", came or "nothing")
+            self.in_step = True
+            try:
+                self.ask(RESYNC.barrier, until)
+                # an older barrier's reply may have come for this one's
+                late = self.drain(until) if self._unanswered else b""
+                if not self._rest + late:
+                    self._unanswered = False
+                    return restarted
+            except LinkLost:
+                raise
+            except RobotRestarted:
+                restarted = True
+            except BridgeError:
+                self._unanswered = True
+
+    def drain(self, until: float) -> bytes:
+        """What comes before nothing has come for a while, or until then.
+
+        Raises:
+            LinkLost: if the port is gone.
+        """
+        came = b""
+        heard = self.clock()
+        while (now := self.clock()) < min(heard + RESYNC.quiet, until):
+            data = self._receive(heard + RESYNC.quiet - now)
+            if data:
+                came = (came + data)[-DROPPED_MAX:]
+                heard = self.clock()
+        return came
+
+    def flush(self) -> None:
+        """End whatever the robot waits for; to be followed by ASCII.
+
+        Raises:
+            LinkLost: if the port is gone.
+        """
+        self._rest = b""
+        self._receive(0.0)
+        self._send(RESYNC.flush)
+        self.in_step = True
+
+    def _send(self, data: bytes) -> None:
+        try:
+            self._opened().send(data)
+        except LinkLost:
+            self.close()
+            raise
+
+    def _receive(self, timeout: float) -> bytes:
+        try:
+            return self._opened().receive(timeout)
+        except LinkLost:
+            self.close()
+            raise
+
+    def _opened(self) -> Port:
+        if self._port is None:
+            raise LinkLost("an open port", "one that was lost")
+        return self._port
+
+
+DROPPED_MAX = 1024
+"""Bytes kept of what is dropped: enough to see a banner in."""
+
+
+def ports() -> list[tuple[str, str]]:
+    """The serial ports of this machine: name and description."""
+    return sorted((port.device, port.description) for port in list_ports.comports())
+
+
+def _why(name: str, error: Exception) -> str:
+    """One line on why a port cannot be opened."""
+    # pyserial wraps most errors, sometimes in the text only
+    number = getattr(error, "errno", None)
+    reason = _one_line(error)
+    if number == errno.ENOENT or isinstance(error, FileNotFoundError):
+        names = ", ".join(port for port, _ in ports()) or "none"
+        return f"no port '{name}'; available: {names}"
+    if number in (errno.EACCES, errno.EPERM):
+        return (
+            f"permission denied for port '{name}': its group, often dialout, may use it"
+        )
+    if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in reason:
+        return f"port '{name}' is busy: another program has it"
+    if "Inappropriate ioctl" in reason or number in (errno.EISDIR, errno.ENOTTY):
+        return f"'{name}' is not a serial port"
+    return f"cannot open port '{name}': {reason}"
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())

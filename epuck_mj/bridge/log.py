@@ -1,0 +1,66 @@
+"""The log of a real robot: a trajectory and a recording, as of a simulated one."""
+
+from datetime import datetime
+from pathlib import Path
+
+from epuck_mj.bridge.session import Session
+from epuck_mj.control import Policy
+from epuck_mj.errors import UserError
+from epuck_mj.files import write_bytes, writing
+from epuck_mj.model import Scene
+from epuck_mj.recording import Trial, save_recording
+
+FOLDER = Path("runs")
+
+
+def log_name(name: Path | None) -> Path:
+    """Path of a log without its endings, where files can be written.
+
+    Args:
+        name: as a person gave it; None makes one of the time.
+
+    Raises:
+        UserError: if nothing can be written there.
+    """
+    if name is None:
+        name = FOLDER / f"robot-{datetime.now():%Y%m%d-%H%M%S}"
+    elif name.suffix in (".npz", ".rrd"):
+        name = name.with_suffix("")
+    with writing(name.parent):
+        name.parent.mkdir(parents=True, exist_ok=True)
+        # better now than when the robot has driven
+        probe = name.with_name(f".{name.name}.probe")
+        write_bytes(probe, b"")
+        probe.unlink()
+    return name
+
+
+def save_log(
+    name: Path, session: Session, policy: Policy, scene: Scene, summary: str
+) -> list[Path]:
+    """Write what there is; the files written, none if nothing was read.
+
+    Args:
+        name: of the files without their endings.
+        session: what happened.
+        policy: that was at the wheel.
+        scene: to show it in.
+        summary: Markdown for the recording.
+
+    Raises:
+        UserError: if they cannot be written.
+    """
+    trajectory = session.trajectory(policy)
+    if trajectory is None:
+        return []
+    # names may have dots of their own
+    arrays, recording = (name.with_name(name.name + end) for end in (".npz", ".rrd"))
+    trajectory.save(arrays)
+    if not trajectory.steps:
+        return [arrays]
+    trial = Trial("robot", trajectory, session.task)
+    try:
+        save_recording(recording, scene, [trial], name.name, summary)
+    except UserError as error:
+        raise UserError(f"{error}; '{arrays}' was written") from None
+    return [arrays, recording]

@@ -1,0 +1,180 @@
+"""The command line of the gap: who is tested, where, and what is written."""
+
+import csv
+import io
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+import tyro
+from tqdm import tqdm
+
+from epuck_mj.command_line import check_threads, parse
+from epuck_mj.errors import UserError
+from epuck_mj.files import write_text, writing
+from evolution.gap.document import document, summary
+from evolution.gap.figure import kept_figure
+from evolution.gap.measure import Outcome, abroad, at_home
+from evolution.gap.transfer import (
+    Transfer,
+    verdict,
+)
+from evolution.gap.worlds import World, worlds
+from evolution.named_policies import NamedPolicy, named_policies
+from evolution.report.blocks import to_markdown
+from evolution.report.figures import save
+from evolution.results import PLANAR_ROBOT, WHEELED_ROBOT
+
+MODULE = "evolution.gap"
+WORLDS_MAX, STARTS_MAX = 1000, 1000
+HOME_STARTS = 100
+"""Test starts at home: what everything is divided by."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Drive champions in worlds that differ from the one they evolved in.
+
+    Attributes:
+        paths: run or study directories, controller files, or wall-follower.
+        output: folder to write gap.md, gap.json, gap.csv and figures into.
+        worlds: how many.
+        starts: test starts in each world.
+        robot: robot that drives; both shipped ones if not given.
+        threads: threads that step the robots; 0 is one per core. Changes no result.
+    """
+
+    paths: tyro.conf.Positional[tuple[str, ...]]
+    output: Path
+    worlds: int = 100
+    starts: int = 10
+    robot: str | None = None
+    threads: int = 0
+
+
+def gap(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status.
+
+    Raises:
+        UserError: for anything the user can put right.
+    """
+    options = parse(Options, f"python -m {MODULE}", argv)
+    for name, value, most in (
+        ("worlds", options.worlds, WORLDS_MAX),
+        ("starts", options.starts, STARTS_MAX),
+    ):
+        if not 2 <= value <= most:
+            raise UserError(f"expected 2 to {most} {name}, got {value}")
+    check_threads(options.threads)
+    if not options.paths:
+        raise UserError(
+            "expected run or study directories, controller files, or wall-follower"
+        )
+    policies = [found for path in options.paths for found in named_policies(path)]
+    places = worlds(options.worlds)
+    robots = [options.robot] if options.robot else [PLANAR_ROBOT, WHEELED_ROBOT]
+    with writing(options.output):
+        options.output.mkdir(parents=True, exist_ok=True)
+    measured = {robot: _measured(policies, places, robot, options) for robot in robots}
+    _write(options.output, policies, places, measured, options)
+    print((options.output / "gap.md").read_text(encoding="utf-8"), end="")
+    return 0
+
+
+Measured = tuple[list[Outcome], list[list[Outcome]]]
+"""At home, and in each world, an outcome per policy."""
+
+
+def _measured(
+    policies: Sequence[NamedPolicy],
+    places: Sequence[World],
+    robot: str,
+    options: Options,
+) -> Measured:
+    home = at_home(policies, robot, HOME_STARTS, options.threads)
+    outcomes = abroad(policies, places, robot, options.starts, options.threads)
+    bar = tqdm(
+        outcomes,
+        total=len(places),
+        unit="world",
+        desc=robot,
+        disable=not sys.stderr.isatty(),
+    )
+    return home, list(bar)
+
+
+def _write(
+    folder: Path,
+    policies: Sequence[NamedPolicy],
+    places: Sequence[World],
+    measured: dict[str, Measured],
+    options: Options,
+) -> None:
+    transfers = {robot: Transfer.of(*outcomes) for robot, outcomes in measured.items()}
+    groups = _groups(policies)
+    record = {
+        "worlds": [asdict(world) for world in places],
+        "starts": options.starts,
+        "home_starts": HOME_STARTS,
+        "robots": {
+            robot: {
+                policy.name: {
+                    **asdict(verdict(transfers[robot], i)),
+                    "abroad": [asdict(world[i]) for world in outcomes[1]],
+                }
+                for i, policy in enumerate(policies)
+            }
+            for robot, outcomes in measured.items()
+        },
+    }
+    with writing(folder):
+        write_text(folder / "gap.json", json.dumps(record, indent=1) + "\n")
+        write_text(folder / "gap.csv", _rows(policies, places, transfers))
+        names = [policy.name for policy in policies]
+        blocks = document(names, transfers, groups, options.starts, HOME_STARTS)
+        write_text(folder / "gap.md", to_markdown(blocks))
+        table = to_markdown([summary(transfers, groups)])
+        write_text(folder / "summary.md", table)
+    save(kept_figure(transfers, groups), folder, "gap")
+
+
+def _groups(policies: Sequence[NamedPolicy]) -> dict[str, list[int]]:
+    """Runs of one experiment together, by name."""
+    groups: dict[str, list[int]] = {}
+    for i, policy in enumerate(policies):
+        path = Path(policy.source)
+        seed = path.name.startswith("seed-")
+        groups.setdefault(path.parent.name if seed else path.name, []).append(i)
+    return groups
+
+
+def _rows(
+    policies: Sequence[NamedPolicy],
+    places: Sequence[World],
+    transfers: dict[str, Transfer],
+) -> str:
+    """A row per robot, policy and world."""
+    keys = [field.name for field in fields(World)]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(
+        ["robot", "policy", "world", "share", "collisions_per_minute", *keys]
+    )
+    for robot, transfer in transfers.items():
+        for i, policy in enumerate(policies):
+            for j, world in enumerate(places):
+                share, collisions = transfer.share[j, i], transfer.collisions[j, i]
+                values = asdict(world).values()
+                writer.writerow(
+                    [
+                        robot,
+                        policy.name,
+                        j,
+                        f"{share:.4f}",
+                        f"{collisions:.4f}",
+                        *values,
+                    ]
+                )
+    return text.getvalue()

@@ -1,0 +1,127 @@
+"""The document of the gap: a table per robot, and how ranks agree."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from evolution.gap.transfer import (
+    COLLISIONS_MAX,
+    SHARE_KEPT,
+    Transfer,
+    Verdict,
+    between_robots,
+    rank_correlations,
+    verdict,
+)
+from evolution.report.blocks import Block, Heading, Listing, Paragraph, Table
+
+COLUMNS = (
+    "experiment",
+    "policy",
+    "fitness at home",
+    "kept, mean",
+    "kept, median",
+    "collisions per minute",
+    "worlds mastered",
+)
+
+
+GROUP_COLUMNS = (
+    "experiment",
+    "robot",
+    "n",
+    "fitness at home",
+    "kept",
+    "collisions per minute",
+    "worlds mastered",
+)
+
+
+def summary(
+    transfers: Mapping[str, Transfer], groups: Mapping[str, Sequence[int]]
+) -> Table:
+    """A row per experiment and robot: medians over its policies of their means.
+
+    Args:
+        transfers: by robot.
+        groups: indices of the policies of each experiment.
+    """
+    rows = []
+    for group, members in groups.items():
+        for robot, transfer in transfers.items():
+            share, collisions, mastered = (
+                float(np.median(values[:, members].mean(axis=0)))
+                for values in (transfer.share, transfer.collisions, transfer.mastered)
+            )
+            home = float(np.median(transfer.home[members]))
+            rows.append(
+                [
+                    *(group, robot, str(len(members)), f"{home:.3f}"),
+                    *(f"{share:.0%}", f"{collisions:.1f}", f"{mastered:.0%}"),
+                ]
+            )
+    return Table(GROUP_COLUMNS, rows, texts=2)
+
+
+def document(
+    names: Sequence[str],
+    transfers: Mapping[str, Transfer],
+    groups: Mapping[str, Sequence[int]],
+    starts: int,
+    home_starts: int,
+) -> list[Block]:
+    """What was found.
+
+    Args:
+        names: of the policies.
+        transfers: by robot, at least one.
+        groups: indices of the policies of each experiment.
+        starts: of each world.
+        home_starts: at home.
+    """
+    n_worlds = len(next(iter(transfers.values())).fitness)
+    blocks: list[Block] = [
+        Heading("The reality gap", 1),
+        Paragraph(
+            f"{len(names)} policies, frozen, in {n_worlds} worlds of a Latin "
+            f"hypercube, {starts} test starts each. Home: the arena they evolved in, "
+            f"ideal sensors and motors, {home_starts} test starts. A world is mastered "
+            f"with at least {SHARE_KEPT:.0%} of the fitness at home and fewer than "
+            f"{COLLISIONS_MAX:g} collision per minute. In brackets, 95 % intervals "
+            "over the worlds."
+        ),
+        summary(transfers, groups),
+        Paragraph("Medians over the policies of an experiment, of their means."),
+    ]
+    for robot, transfer in transfers.items():
+        rows = [
+            [group, names[i], *_cells(verdict(transfer, i))]
+            for group, members in groups.items()
+            for i in members
+        ]
+        blocks += [Heading(robot), Table(COLUMNS, rows, texts=2)]
+        ranks = rank_correlations(transfer)
+        if ranks is not None:
+            items = [
+                "Rank correlation of the policies (Spearman) between home and a world, "
+                f"mean over the worlds: {ranks['home']:.2f}",
+                f"Between two worlds, mean over all pairs: {ranks['worlds']:.2f}",
+            ]
+            blocks.append(Listing(items))
+    if len(transfers) == 2:
+        correlation = between_robots(*transfers.values())
+        if correlation is not None:
+            text = "Between the two robots, by mean fitness over the worlds: "
+            blocks.append(Paragraph(f"{text}{correlation:.2f}"))
+    return blocks
+
+
+def _cells(found: Verdict) -> list[str]:
+    share, collisions, mastered = found.share, found.collisions, found.mastered
+    return [
+        f"{found.home:.3f}",
+        f"{share.value:.2f} [{share.low:.2f}, {share.high:.2f}]",
+        f"{found.median_share:.2f}",
+        f"{collisions.value:.1f} [{collisions.low:.1f}, {collisions.high:.1f}]",
+        f"{mastered.value:.0%} [{mastered.low:.0%}, {mastered.high:.0%}]",
+    ]

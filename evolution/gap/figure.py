@@ -1,0 +1,57 @@
+"""The figure of the gap: how much is kept in how many worlds."""
+
+from collections.abc import Mapping
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from epuck_mj.colors import TRIALS
+from evolution.gap.transfer import SHARE_KEPT, Transfer
+from evolution.report.figures.style import PAGE, PRINT, ROBOTS, color
+
+LINES = ("-", (0, (7, 2)), (0, (2, 1.5)), (0, (7, 1.5, 1.2, 1.5)))
+
+SHARE_END = 1.2
+"""Of the axis; some worlds are kinder than home."""
+
+
+def kept_figure(
+    transfers: Mapping[str, Transfer], groups: Mapping[str, list[int]]
+) -> Figure:
+    """A panel per robot, a line per group.
+
+    Args:
+        transfers: by robot.
+        groups: indices of the policies of each group.
+    """
+    with matplotlib.rc_context(PRINT):
+        figure = Figure(figsize=(PAGE, 2.9), layout="constrained")
+        panels = figure.subplots(1, len(transfers), sharey=True, squeeze=False)[0]
+        for axes, (robot, transfer) in zip(panels, transfers.items(), strict=True):
+            for i, (group, members) in enumerate(groups.items()):
+                share = np.sort(transfer.share[:, members].ravel())
+                at_least = 1 - np.arange(share.size + 1) / share.size
+                axes.step(
+                    [0, *share, SHARE_END],
+                    [1, *at_least],
+                    where="pre",
+                    label=f"{group} (n = {len(members)})",
+                    color=color(TRIALS[i % len(TRIALS)]),
+                    linestyle=LINES[i % len(LINES)],
+                    lw=1.4,
+                )
+            axes.axvline(SHARE_KEPT, color="0.4", lw=0.8, ls=":")
+            axes.set(
+                title=ROBOTS.get(robot, robot),
+                xlabel="share of the fitness at home, at least",
+                xlim=(0, SHARE_END),
+                ylim=(0, 1),
+            )
+        panels[0].set_ylabel("share of worlds")
+        figure.legend(
+            *panels[0].get_legend_handles_labels(),
+            loc="outside lower center",
+            ncols=min(4, len(groups)),
+        )
+    return figure

@@ -1,0 +1,92 @@
+"""What champions are worth in each world, against what they are worth at home."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from epuck_mj.model import Scene, load_scene
+from epuck_mj.simulation import SimulatedRobots
+from epuck_mj.starts import FreeSpace
+from epuck_mj.tracks import Tracks, record_tracks
+from evolution.champion import starts_for_test
+from evolution.gap.worlds import World, met
+from evolution.held_out import Everybody
+from evolution.named_policies import NamedPolicy
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A policy in a world.
+
+    Attributes:
+        fitness: mean step fitness over the whole time of a trial, in [0, 1].
+        collisions_per_minute: crashes per minute lived.
+        crash_rate: share of the trials that ended in a crash.
+    """
+
+    fitness: float
+    collisions_per_minute: float
+    crash_rate: float
+
+
+def at_home(
+    policies: Sequence[NamedPolicy], robot: str, n: int, threads: int
+) -> list[Outcome]:
+    """Each policy in the arena it evolved in, on an ideal robot, on `n` test starts."""
+    outcomes = []
+    for policy in policies:
+        scene = load_scene(robot, policy.arena, policy.task.control_step)
+        robots = SimulatedRobots(scene, n, threads)
+        starts = starts_for_test(FreeSpace(scene, policy.start_clearance), n)
+        everybody = Everybody(policy.policy)
+        tracks = record_tracks(robots, everybody, starts, policy.task)
+        outcomes.append(_outcome(tracks, policy.task.control_step))
+    return outcomes
+
+
+def abroad(
+    policies: Sequence[NamedPolicy],
+    worlds: Sequence[World],
+    robot: str,
+    n: int,
+    threads: int,
+) -> Iterator[list[Outcome]]:
+    """All policies in one world after the other, on `n` test starts.
+
+    They all meet the same robot and the same noise; a trial lasts as long as at home.
+    """
+    for index, world in enumerate(worlds):
+        scene, period = _scene(world, robot)
+        robots = SimulatedRobots(scene, n, threads)
+        outcomes = []
+        for policy in policies:
+            duration = policy.task.steps * policy.task.control_step
+            steps = round(duration / period)
+            task = replace(policy.task, steps=steps, control_step=period)
+            starts = starts_for_test(FreeSpace(scene, policy.start_clearance), n)
+            tracks = record_tracks(
+                robots,
+                Everybody(policy.policy),
+                starts,
+                task,
+                met(world, index, n, steps),
+            )
+            outcomes.append(_outcome(tracks, period))
+        yield outcomes
+
+
+def _scene(world: World, robot: str) -> tuple[Scene, float]:
+    """A world's scene, and its period in whole physics steps [s]."""
+    step = load_scene(robot, world.arena).model.opt.timestep
+    period = round(max(1, round(world.period / step)) * step, 9)
+    return load_scene(robot, world.arena, period), period
+
+
+def _outcome(tracks: Tracks, period: float) -> Outcome:
+    lived = tracks.steps.sum() * period
+    duration = tracks.fitness.shape[1] * period
+    return Outcome(
+        # a crash ends the earning, not the time
+        fitness=float(tracks.trial_fitness.mean() * period / duration),
+        collisions_per_minute=float(60 * tracks.crashed.sum() / lived),
+        crash_rate=float(tracks.crashed.mean()),
+    )

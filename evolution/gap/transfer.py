@@ -1,0 +1,120 @@
+"""What of champions survives: shares, collisions, ranks, each with its uncertainty."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from evolution.gap.measure import Outcome
+from evolution.statistics import Interval, mean_interval, wilson
+
+SHARE_KEPT = 0.8
+"""Least share of its fitness at home that a policy keeps in a world it masters."""
+
+COLLISIONS_MAX = 1.0
+"""Collisions per minute from which on it has not mastered that world."""
+
+
+@dataclass(frozen=True, eq=False)
+class Transfer:
+    """Policies `(p,)` in worlds `(w,)`.
+
+    Attributes:
+        home: mean step fitness at home, `(p,)`.
+        fitness: the same in each world, `(w, p)`.
+        collisions: per minute, `(w, p)`.
+    """
+
+    home: np.ndarray
+    fitness: np.ndarray
+    collisions: np.ndarray
+
+    @classmethod
+    def of(
+        cls, home: Sequence[Outcome], abroad: Sequence[Sequence[Outcome]]
+    ) -> "Transfer":
+        """From what was measured, one sequence of outcomes per world."""
+        return cls(
+            np.array([outcome.fitness for outcome in home]),
+            np.array([[o.fitness for o in world] for world in abroad]),
+            np.array([[o.collisions_per_minute for o in world] for world in abroad]),
+        )
+
+    @property
+    def share(self) -> np.ndarray:
+        """Share of its fitness at home that each policy keeps, `(w, p)`; 0 of none."""
+        return self.fitness / np.maximum(self.home, np.finfo(float).tiny)
+
+    @property
+    def mastered(self) -> np.ndarray:
+        """Which worlds each policy masters, `(w, p)`."""
+        return (self.share >= SHARE_KEPT) & (self.collisions < COLLISIONS_MAX)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One policy, or the median one of several, in all worlds.
+
+    Attributes:
+        home: mean step fitness at home.
+        share: mean share of that over the worlds.
+        median_share: median over the worlds.
+        collisions: mean per minute over the worlds.
+        mastered: share of the worlds that were mastered.
+    """
+
+    home: float
+    share: Interval
+    median_share: float
+    collisions: Interval
+    mastered: Interval
+
+
+def verdict(transfer: Transfer, policy: int) -> Verdict:
+    """What the worlds say of one policy."""
+    rng = np.random.default_rng(0)
+    share, mastered = transfer.share[:, policy], transfer.mastered[:, policy]
+    return Verdict(
+        home=float(transfer.home[policy]),
+        share=mean_interval(share, rng),
+        median_share=float(np.median(share)),
+        collisions=mean_interval(transfer.collisions[:, policy], rng),
+        mastered=wilson(int(mastered.sum()), len(mastered)),
+    )
+
+
+def rank_correlations(transfer: Transfer) -> dict[str, float] | None:
+    """Spearman's, of the policies' ranks; None if there are fewer than three.
+
+    `home`: between home and a world, the mean over the worlds. `worlds`: between two
+    worlds, the mean over all pairs. Worlds where all fare alike say nothing.
+    """
+    if len(transfer.home) < 3:
+        return None
+    told = transfer.fitness[np.ptp(transfer.fitness, axis=1) > 0]
+    home = [_spearman(transfer.home, world) for world in told]
+    pairs = [
+        _spearman(one, other) for i, one in enumerate(told) for other in told[i + 1 :]
+    ]
+    return {"home": _mean(home), "worlds": _mean(pairs)}
+
+
+def between_robots(one: Transfer, other: Transfer) -> float | None:
+    """Spearman's, of the policies' mean fitness over the worlds on two robots."""
+    if len(one.home) < 3:
+        return None
+    return _spearman(one.fitness.mean(axis=0), other.fitness.mean(axis=0))
+
+
+def _spearman(a: np.ndarray, b: np.ndarray) -> float:
+    if np.ptp(a) == 0 or np.ptp(b) == 0:
+        return float("nan")
+    # Pearson's of the ranks
+    ranks = stats.rankdata(a), stats.rankdata(b)
+    return float(np.corrcoef(*ranks)[0, 1])
+
+
+def _mean(values: list[float]) -> float:
+    known = [value for value in values if not np.isnan(value)]
+    return float(np.mean(known)) if known else float("nan")

@@ -1,0 +1,121 @@
+"""Worlds: pseudo-realities, spread evenly over what may be different on a robot."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import qmc
+
+from epuck_mj.constants import N_PROXIMITY, PROXIMITY_PERIOD, TRACK, WHEEL_RADIUS
+from epuck_mj.disturbances import N_WHEELS, Disturbances
+
+WORLD_SEED = 0
+"""Of the worlds: the same for every champion and every study."""
+
+
+@dataclass(frozen=True)
+class World:
+    """A pseudo-reality.
+
+    Attributes:
+        arena: shipped arena.
+        period: duration of a control step [s]; the nearest that physics steps allow.
+        curve: counts of all proximity sensors against the published ones.
+        gain_spread: standard deviation of the logarithm of each sensor's gain.
+        count_noise: in published standard deviations.
+        wheel_radius: of both wheels [m].
+        bias: of the left wheel's speed over the right one's.
+        track: effective distance of the wheels [m].
+        slip: relative standard deviation of a wheel's speed in a control step.
+        latency: control steps until a command has reached the wheels.
+        mass: of the robot against its own.
+        friction: of its wheels against their own.
+    """
+
+    arena: str
+    period: float
+    curve: float
+    gain_spread: float
+    count_noise: float
+    wheel_radius: float
+    bias: float
+    track: float
+    slip: float
+    latency: int
+    mass: float
+    friction: float
+
+
+ARENAS = ("arena", "small_square", "rectangle", "l_shape", "octagon")
+
+RANGES: dict[str, tuple[float, float]] = {
+    "period": (0.08, 0.12),
+    # a logarithm: half as strong is as likely as twice as strong
+    "curve": (np.log(1 / 1.5), np.log(1.5)),
+    "gain_spread": (0.0, 0.25),
+    "count_noise": (0.0, 3.0),
+    "wheel_radius": (0.0200, 0.0207),
+    "bias": (-0.03, 0.03),
+    "track": (0.051, 0.057),
+    "slip": (0.0, 0.06),
+    "mass": (0.93, 1.07),
+    "friction": (0.7, 1.2),
+}
+"""Lowest and highest of what is continuous.
+
+Source: the figures of books and drivers differ by so much, and so do the gains of eight
+sensors of two robots.
+"""
+
+LATENCY_MAX = 3
+
+
+def worlds(n: int) -> list[World]:
+    """The first worlds of a Latin hypercube of `n`: every range in `n` even parts."""
+    names = list(RANGES)
+    cube = qmc.LatinHypercube(len(names) + 2, rng=np.random.default_rng(WORLD_SEED))
+    found = []
+    for row in cube.random(n):
+        values = {
+            name: low + share * (high - low)
+            for (name, (low, high)), share in zip(RANGES.items(), row, strict=False)
+        }
+        values["curve"] = float(np.exp(values["curve"]))
+        arena, latency = row[-2] * len(ARENAS), row[-1] * (LATENCY_MAX + 1)
+        plain = {name: float(value) for name, value in values.items()}
+        found.append(World(arena=ARENAS[int(arena)], latency=int(latency), **plain))
+    return found
+
+
+def met(world: World, index: int, n: int, steps: int) -> Disturbances:
+    """What `n` trials of `steps` control steps meet in a world: one robot, new noise.
+
+    Args:
+        world: the pseudo-reality.
+        index: its number, by which its noise is drawn.
+        n: number of trials.
+        steps: of a trial.
+    """
+    key = np.random.SeedSequence(WORLD_SEED, spawn_key=(index,))
+    rng = np.random.default_rng(key)
+    # one robot in all trials: only its noise is new
+    gains = world.curve * np.exp(world.gain_spread * rng.standard_normal(N_PROXIMITY))
+    age = rng.uniform(0, PROXIMITY_PERIOD, N_PROXIMITY)
+    wheels = world.wheel_radius / WHEEL_RADIUS
+    sides = wheels * (1 + world.bias * np.array([0.5, -0.5]))
+
+    def same(value: np.ndarray | float) -> np.ndarray:
+        return np.repeat(np.array(value)[None], n, axis=0)
+
+    count_noise = rng.standard_normal((n, steps + 1, N_PROXIMITY))
+    return Disturbances(
+        of=np.arange(n),
+        gains=same(gains),
+        age=same(age),
+        count_noise=world.count_noise * count_noise,
+        wheel_gains=same(sides),
+        turn_gain=same(TRACK / world.track),
+        wheel_noise=world.slip * rng.standard_normal((n, steps, N_WHEELS)),
+        latency=same(world.latency),
+        mass=same(world.mass),
+        friction=same(world.friction),
+    )

@@ -1,0 +1,485 @@
+"""`python -m epuck_mj.bridge` in processes of its own, on emulated robots."""
+
+import os
+import pty
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from epuck_mj.bridge.__main__ import bridge
+from epuck_mj.bridge.body import Wheel
+from epuck_mj.bridge.fake.endpoints import Pty, Tcp
+from epuck_mj.bridge.interruption import SIGNALS, Interrupted, Interruption
+from epuck_mj.calibration import Calibration
+from epuck_mj.constants import SPEED_MAX, WHEEL_RADIUS
+from epuck_mj.controller import ControllerFile, Network
+from epuck_mj.errors import UserError
+from epuck_mj.model import load_scene
+from epuck_mj.motors import STEP_ANGLE
+from epuck_mj.trajectory import Trajectory
+from tests.test_fake import PATIENCE, fake_process, living, wait_for
+
+ROOT = Path(__file__).resolve().parent.parent
+CHAMPION = ROOT / "results" / "paper" / "de-best" / "seed-1" / "champion.json"
+AT_WALL = (0.44, 0.0, np.pi / 2)
+
+
+@pytest.fixture(scope="module")
+def planar():
+    return load_scene("epuck_planar", "arena")
+
+
+@pytest.fixture
+def port(tmp_path):
+    return Pty(tmp_path / "e-puck")
+
+
+def command(port, log, *arguments, champion: str | Path = "wall-follower"):
+    return [
+        *(sys.executable, "-W", "error", "-m", "epuck_mj.bridge", str(champion)),
+        *("--port", str(port), "--log", str(log), *arguments),
+    ]
+
+
+@contextmanager
+def started(port, log, *arguments, **options):
+    """A bridge that is under way; killed if it hangs."""
+    process = subprocess.Popen(
+        command(port, log, *arguments),
+        stdin=options.pop("stdin", subprocess.DEVNULL),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **options,
+    )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.communicate(timeout=PATIENCE)
+
+
+BUSY = "expected a reading every 300 ms"
+
+
+def run(
+    port,
+    log,
+    *arguments,
+    champion: str | Path = "wall-follower",
+    disturbed: bool = False,
+):
+    """A bridge from start to end.
+
+    Where nothing goes wrong on purpose, a machine so busy that the watchdog saw it
+    gets a second and a third chance.
+    """
+    for chance in (3, 2, 1):
+        done = subprocess.run(
+            command(port, log, *arguments, champion=champion),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
+        if disturbed or BUSY not in done.stderr or chance == 1:
+            return done
+    raise AssertionError("unreachable")
+
+
+def moving(emulator):
+    wait_for(lambda: not emulator.body.standing, "drove")
+
+
+# as planned
+
+
+@pytest.mark.slow
+def test_a_champion_drives_a_robot(planar, port, tmp_path):
+    log = tmp_path / "logs" / "drive.1"
+    with living(port, planar, AT_WALL) as emulator:
+        pose = ["0.44", "0", "90"]
+        done = run(
+            port.name,
+            log,
+            *("--seconds", "2", "--pose", *pose),
+            champion=CHAMPION,
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        assert emulator.body.standing
+        moved = np.linalg.norm(emulator.body.pose[:2] - AT_WALL[:2])
+    for text in (
+        "Version 1.2.2 August 2008 GCtronic, HW version: 1.1; battery good",
+        "control steps  20,",
+        "latency        median",
+        "odometry ",
+        "fitness ",
+        "drive.1.npz",
+        "ended; the robot stands still",
+    ):
+        assert text in done.stdout
+    trajectory = Trajectory.load(tmp_path / "logs" / "drive.1.npz")
+    assert trajectory.steps == 20
+    assert trajectory.hidden.shape == (20, 4)
+    np.testing.assert_allclose(trajectory.pose[0], AT_WALL, atol=1e-9)
+    by_odometry = np.linalg.norm(trajectory.pose[-1, :2] - AT_WALL[:2])
+    assert moved == pytest.approx(by_odometry, abs=0.05)
+    assert moved > 0.05
+    entities = RrdReader(tmp_path / "logs" / "drive.1.rrd").store()
+    assert entities is not None
+
+
+@pytest.mark.slow
+def test_over_tcp_with_everything_asked_for(planar, tmp_path):
+    Calibration(track=0.055).save(tmp_path / "robot.yaml")
+    endpoint = Tcp(0)
+    with living(endpoint, planar, AT_WALL) as emulator:
+        done = run(
+            endpoint.name,
+            tmp_path / "log",
+            *("--seconds", "1", "--calibrate", "--max-speed", "0.03"),
+            *("--calibration", str(tmp_path / "robot.yaml")),
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        assert emulator.body.standing
+    assert "keep 20 cm around the robot clear" in done.stdout
+    assert "calibrated" in done.stdout
+    trajectory = Trajectory.load(tmp_path / "log.npz")
+    assert np.abs(trajectory.command).max() * WHEEL_RADIUS < 0.03 + 0.001
+    # zeroed where it stood
+    np.testing.assert_array_equal(trajectory.proximity[0], 0)
+
+
+@pytest.mark.slow
+def test_a_dry_run(planar, port, tmp_path):
+    with living(port, planar, AT_WALL) as emulator:
+        done = run(port.name, tmp_path / "log", "--seconds", "1", "--dry-run")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert not any(row[0] or row[2] for row in emulator.body.journal.command)
+        np.testing.assert_allclose(emulator.body.pose, AT_WALL, atol=1e-6)
+    assert "DRY RUN" in done.stdout
+    trajectory = Trajectory.load(tmp_path / "log.npz")
+    assert trajectory.steps == 10
+    assert not trajectory.command.any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("faults", ["", "stall@2", "disconnect@1.5", "gone@1.5"])
+def test_over_wifi(planar, tmp_path, faults):
+    endpoint = Tcp(0)
+    seconds = "2" if not faults else "60"
+    with living(endpoint, planar, AT_WALL, "wifi", faults) as emulator:
+        name = f"tcp://127.0.0.1:{endpoint.port}"
+        done = run(name, tmp_path / "log", "--seconds", seconds, disturbed=bool(faults))
+        assert emulator.body.standing == (faults != "gone@1.5")
+    status = {"": 0, "gone@1.5": 4}.get(faults, 3)
+    assert done.returncode == status, done.stderr
+    assert done.stderr.count("\n") == (status > 0)
+    assert "e-puck2 over WiFi, selector at 3" in done.stdout
+    trajectory = Trajectory.load(tmp_path / "log.npz")
+    assert trajectory.steps > 5
+    assert np.linalg.norm(trajectory.pose[-1, :2] - AT_WALL[:2]) > 0.02
+
+
+@pytest.mark.slow
+def test_calibration_over_wifi(planar, tmp_path):
+    endpoint = Tcp(0)
+    with living(endpoint, planar, AT_WALL, "wifi"):
+        name = f"tcp://127.0.0.1:{endpoint.port}"
+        done = run(name, tmp_path / "log", "--seconds", "0.5", "--calibrate")
+    assert (done.returncode, done.stderr) == (0, "")
+    proximity = Trajectory.load(tmp_path / "log.npz").proximity
+    np.testing.assert_array_equal(proximity[0], 0)
+
+
+# every way out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "signum", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT]
+)
+def test_signals(planar, port, tmp_path, signum):
+    with (
+        living(port, planar) as emulator,
+        started(port.name, tmp_path / "log") as process,
+    ):
+        moving(emulator)
+        process.send_signal(signum)
+        # further ones do no harm
+        time.sleep(0.02)
+        process.send_signal(signal.SIGTERM)
+        _, error = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 128 + signum
+        assert emulator.body.standing
+    assert error == f"{signum.name}: ended, the robot stands still\n"
+    assert Trajectory.load(tmp_path / "log.npz").steps >= 0
+
+
+@pytest.mark.slow
+def test_the_operators_key(planar, port, tmp_path):
+    master, slave = pty.openpty()
+    try:
+        with (
+            living(port, planar) as emulator,
+            started(port.name, tmp_path / "log", stdin=slave) as process,
+        ):
+            moving(emulator)
+            os.write(master, b"xq")
+            out, error = process.communicate(timeout=PATIENCE)
+            assert (process.returncode, error) == (0, "")
+            assert emulator.body.standing
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert "q or space stops" in out
+    assert "stopped by the operator's key; the robot stands still" in out
+
+
+@pytest.mark.slow
+def test_a_reader_that_went_away(planar, port, tmp_path):
+    with (
+        living(port, planar) as emulator,
+        started(port.name, tmp_path / "log") as process,
+    ):
+        moving(emulator)
+        assert process.stdout is not None
+        process.stdout.close()
+        process.stdout = None
+        process.wait(PATIENCE)
+        assert process.returncode == 1
+        assert emulator.body.standing
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("faults", "status", "cause"),
+    [
+        ("stall@1", 3, "expected a reading every 300 ms; came none: expected a reply"),
+        ("reset@1", 3, "WELCOME"),
+        ("disconnect@1", 3, "expected a robot at '"),
+        ("gone@1", 4, "THE MOTORS MAY STILL TURN, switch the robot off: "),
+        ("loss@1+100", 3, "expected a reading every 300 ms"),
+        ("noise@1,noise@1.5,noise@2,noise@2.5,noise@3,noise@4", None, ""),
+        ("garbage@1,garbage@2", None, ""),
+    ],
+)
+def test_faults(planar, port, tmp_path, faults, status, cause):
+    arguments = ("--seconds", "4") if status is None else ()
+    with living(port, planar, AT_WALL, faults=faults) as emulator:
+        done = run(port.name, tmp_path / "log", *arguments, disturbed=True)
+        assert emulator.body.standing == (status != 4)
+    assert done.returncode in ((0, 3) if status is None else (status,))
+    if done.returncode:
+        assert done.stderr.startswith("error: ")
+        assert done.stderr.count("\n") == 1
+        assert cause in done.stderr
+    # what was seen until then
+    assert Trajectory.load(tmp_path / "log.npz").steps > 0
+    assert "control steps" in done.stdout
+
+
+@pytest.mark.slow
+def test_a_robot_that_dies(tmp_path):
+    with (
+        fake_process("--robot", "epuck_planar", "--tcp", "0") as (robot, name),
+        started(name, tmp_path / "log") as process,
+    ):
+        assert process.stdout is not None
+        # it drives
+        for _ in range(4):
+            process.stdout.readline()
+        robot.kill()
+        _, error = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 4
+    assert error.startswith("error: THE MOTORS MAY STILL TURN, switch the robot off")
+    assert "Connection refused" in error
+    assert error.count("\n") == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["pty", "tcp", "wifi"])
+def test_a_bridge_that_is_killed(planar, tmp_path, kind):
+    """`kill -9` too: its guardian stops the robot, and lets go of the port."""
+    endpoint = Pty(tmp_path / "e-puck") if kind == "pty" else Tcp(0)
+    robot = "wifi" if kind == "wifi" else "asercom"
+    with living(endpoint, planar, robot=robot) as emulator:
+        name = endpoint.name
+        if kind == "wifi":
+            name = name.replace("socket:", "tcp:")
+        with started(name, tmp_path / "log") as process:
+            moving(emulator)
+            process.kill()
+            process.wait(PATIENCE)
+            killed = time.monotonic()
+            wait_for(lambda: emulator.body.standing, "stood")
+        # measured as 20 ms; this machine may be busy
+        assert time.monotonic() - killed < 5
+        wait_for(
+            lambda: run(name, tmp_path / "log", "--seconds", "0.1").returncode == 0,
+            "was there for the next",
+        )
+        assert emulator.body.standing
+
+
+@pytest.mark.slow
+def test_the_next_bridge_stops_a_robot_first(planar, port, tmp_path):
+    with living(port, planar) as emulator:
+        emulator.body.drive(Wheel(500.0, 0.0), Wheel(500.0, 0.0))
+        done = run(port.name, tmp_path / "log", "--seconds", "0.1", "--dry-run")
+        assert done.returncode == 0
+        assert emulator.body.standing
+
+
+# bad input
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "expected a controller file or wall-follower"),
+        (["wall-follower"], "expected --port; --list-ports"),
+        (["no.json", "--port", "x"], "cannot read controller 'no.json'"),
+        (["README.md", "--port", "x"], "'README.md' is not a controller file"),
+        (["wall-follower", "--port", "/dev/nope"], "no port '/dev/nope'; available"),
+        (["wall-follower", "--port", "/dev/null"], "is not a serial port"),
+        (["wall-follower", "--port", "socket://127.0.0.1:1"], "Connection refused"),
+        (["wall-follower", "--port", "x", "--seconds", "0"], "expected --seconds"),
+        (["wall-follower", "--port", "x", "--seconds", "nan"], "expected --seconds"),
+        (["wall-follower", "--port", "x", "--max-speed", "1"], "expected --max-speed"),
+        (["wall-follower", "--port", "x", "--pose", "0", "0", "inf"], "finite"),
+        (["wall-follower", "--port", "x", "--arena", "no"], "no arena 'no'"),
+        (["wall-follower", "--port", "x", "--calibration", "no"], "calibration 'no'"),
+        (["wall-follower", "--port", "x", "--log", "/proc/x/y"], "cannot write"),
+        (["wall-follower", "--port", "x", "--nonsense"], "nonsense"),
+    ],
+)
+def test_bad_input(arguments, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "README.md").write_text("hello")
+    with pytest.raises(UserError, match=message) as caught:
+        bridge(arguments)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_champion_of_another_network(tmp_path):
+    file = ControllerFile(Network(hidden=5), np.zeros(50), {}, {}, {})
+    path = tmp_path / "champion.json"
+    path.write_text(file.to_json().replace('"hidden": 5', '"hidden": 4'))
+    with pytest.raises(UserError, match="expected 40 finite genes, got 50"):
+        bridge([str(path), "--port", "x"])
+    path.write_text(file.to_json())
+    with pytest.raises(UserError, match="does not say which robot"):
+        bridge([str(path), "--port", "x"])
+
+
+@pytest.mark.slow
+def test_a_device_that_is_no_robot(tmp_path):
+    """It echoes whatever it hears: one line, status 2, and soon."""
+    master, slave = pty.openpty()
+    end = threading.Event()
+
+    def echo():
+        while not end.is_set():
+            try:
+                os.write(master, os.read(master, 100))
+            except OSError:
+                return
+
+    thread = threading.Thread(target=echo)
+    thread.start()
+    try:
+        done = run(os.ttyname(slave), tmp_path / "log")
+    finally:
+        end.set()
+        os.write(slave, b"x")
+        thread.join(PATIENCE)
+        os.close(slave)
+        os.close(master)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: expected ")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_a_busy_port(planar, port, tmp_path):
+    with (
+        living(port, planar) as emulator,
+        started(port.name, tmp_path / "log", "--seconds", "600") as first,
+    ):
+        moving(emulator)
+        done = run(port.name, tmp_path / "other")
+        assert done.returncode == 2
+        assert done.stderr == (
+            f"error: port '{port.name}' is busy: another program has it\n"
+        )
+        first.send_signal(signal.SIGINT)
+        assert first.wait(PATIENCE) == 130
+        assert emulator.body.standing
+
+
+@pytest.mark.slow
+def test_list_of_ports():
+    done = subprocess.run(
+        [sys.executable, "-m", "epuck_mj.bridge", "--list-ports"],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+# signals
+
+
+@pytest.fixture
+def handlers():
+    before = {signum: signal.getsignal(signum) for signum in SIGNALS}
+    yield before
+    for signum, handler in before.items():
+        signal.signal(signum, handler)
+
+
+def test_signals_raise_where_they_may_only(handlers):
+    with Interruption() as interruption:
+        signal.raise_signal(signal.SIGTERM)
+        assert interruption.signum == signal.SIGTERM
+        with pytest.raises(Interrupted), interruption.raising():
+            pytest.fail("one came before")
+        signal.raise_signal(signal.SIGINT)
+        assert interruption.signum == signal.SIGTERM
+    # what follows is the end of the process
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
+
+
+def test_a_second_signal_breaks_nothing_off(handlers):
+    with (
+        Interruption() as interruption,
+        pytest.raises(Interrupted),
+        interruption.raising(),
+    ):
+        try:
+            signal.raise_signal(signal.SIGINT)
+        finally:
+            signal.raise_signal(signal.SIGTERM)
+            signal.raise_signal(signal.SIGINT)
+    assert interruption.signum == signal.SIGINT
+
+
+def test_without_a_signal_handlers_are_as_before(handlers):
+    with Interruption() as interruption, interruption.raising():
+        assert signal.getsignal(signal.SIGTERM) is not handlers[signal.SIGTERM]
+    assert {signum: signal.getsignal(signum) for signum in SIGNALS} == handlers
+
+
+def test_top_speed_in_whole_steps():
+    assert pytest.approx(1000 * STEP_ANGLE * WHEEL_RADIUS) == SPEED_MAX

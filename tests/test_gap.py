@@ -1,0 +1,224 @@
+"""The reality gap: worlds that cover what may differ, and honest arithmetic on them."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from epuck_mj.constants import TRACK, WHEEL_RADIUS
+from epuck_mj.control import TaskParameters
+from epuck_mj.errors import UserError
+from epuck_mj.wall_follower import WallFollower
+from evolution.gap import command
+from evolution.gap import worlds as gap_worlds
+from evolution.gap.command import gap
+from evolution.gap.document import document
+from evolution.gap.measure import Outcome, abroad, at_home
+from evolution.gap.transfer import (
+    Transfer,
+    between_robots,
+    rank_correlations,
+    verdict,
+)
+from evolution.gap.worlds import ARENAS, LATENCY_MAX, RANGES, World, met, worlds
+from evolution.named_policies import NamedPolicy, named_policies
+from evolution.report.blocks import to_markdown
+
+CHAMPION = Path(__file__).parent.parent / "results/paper/de-best/seed-1/champion.json"
+HOME = World(
+    arena="arena",
+    period=0.1,
+    curve=1.0,
+    gain_spread=0.0,
+    count_noise=0.0,
+    wheel_radius=WHEEL_RADIUS,
+    bias=0.0,
+    track=TRACK,
+    slip=0.0,
+    latency=0,
+    mass=1.0,
+    friction=1.0,
+)
+FOLLOWER = NamedPolicy("wall-follower", WallFollower(), TaskParameters(steps=100))
+
+
+def test_a_hypercube_covers_every_range_evenly():
+    n = 40
+    found = worlds(n)
+    for name, (low, high) in RANGES.items():
+        values = np.array([getattr(world, name) for world in found])
+        values = np.log(values) if name == "curve" else values
+        part = np.floor((values - low) / (high - low) * n).astype(int)
+        assert sorted(part) == list(range(n)), name
+    for name, choices in (("arena", ARENAS), ("latency", range(LATENCY_MAX + 1))):
+        counts = [[getattr(w, name) for w in found].count(c) for c in choices]
+        assert counts == [n // len(choices)] * len(choices), name
+    assert worlds(n) == found
+    assert worlds(n + 1)[:3] != found[:3]
+
+
+def test_a_world_has_one_robot_and_new_noise_in_each_trial():
+    world = worlds(4)[1]
+    one, again, other = met(world, 1, 5, 9), met(world, 1, 5, 9), met(world, 2, 5, 9)
+    for name in ("gains", "age", "wheel_gains", "turn_gain", "latency", "mass"):
+        values = getattr(one, name)
+        assert (values == values[0]).all(), name
+        np.testing.assert_array_equal(getattr(again, name), values)
+    assert (one.count_noise[0] != one.count_noise[1]).any()
+    assert (one.gains != other.gains).any()
+    np.testing.assert_allclose(
+        one.wheel_gains[0].mean() * WHEEL_RADIUS, world.wheel_radius
+    )
+    left, right = one.wheel_gains[0]
+    np.testing.assert_allclose((left - right) / one.wheel_gains[0].mean(), world.bias)
+    np.testing.assert_allclose(TRACK / one.turn_gain, world.track)
+    assert (one.latency == world.latency).all()
+
+
+@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
+def test_a_world_like_home_keeps_everything(robot):
+    (home,) = at_home([FOLLOWER], robot, 20, 1)
+    ((same,),) = abroad([FOLLOWER], [HOME], robot, 20, 1)
+    # counts and whole steps are all that is left
+    assert abs(same.fitness / home.fitness - 1) < 0.05
+    assert same.collisions_per_minute < 1
+    worse = replace(HOME, latency=3, curve=0.7)
+    ((hurt,),) = abroad([FOLLOWER], [worse], robot, 20, 1)
+    assert hurt.fitness < 0.5 * home.fitness
+
+
+def test_threads_and_company_change_nothing():
+    other = named_policies(str(CHAMPION))
+    places = worlds(3)[:2]
+    alone = list(abroad([FOLLOWER], places, "epuck_planar", 4, 1))
+    both = list(abroad([*other, FOLLOWER], places, "epuck_planar", 4, 2))
+    assert [outcomes[-1] for outcomes in both] == [outcomes[0] for outcomes in alone]
+
+
+def test_a_trial_lasts_as_long_in_every_world():
+    """Faster control steps are more of them; a mean step is worth the same."""
+    for period in (0.075, 0.125):
+        ((found,),) = abroad(
+            [FOLLOWER], [replace(HOME, period=period)], "epuck_planar", 20, 1
+        )
+        (home,) = at_home([FOLLOWER], "epuck_planar", 20, 1)
+        assert abs(found.fitness / home.fitness - 1) < 0.2
+
+
+def outcomes(fitness, collisions):
+    return [Outcome(f, c, 0.0) for f, c in zip(fitness, collisions, strict=True)]
+
+
+TRANSFER = Transfer.of(
+    outcomes([0.5, 0.4, 0.1], [0, 0, 0]),
+    [
+        outcomes([0.5, 0.4, 0.1], [0.0, 0.5, 2.0]),
+        outcomes([0.41, 0.3, 0.0], [0.0, 0.0, 0.0]),
+        outcomes([0.2, 0.4, 0.3], [0.0, 1.0, 0.0]),
+        outcomes([0.3, 0.3, 0.3], [0.0, 0.0, 0.0]),
+    ],
+)
+
+
+def test_shares_and_mastered_worlds():
+    np.testing.assert_allclose(TRANSFER.share[:, 0], [1, 0.82, 0.4, 0.6])
+    np.testing.assert_array_equal(
+        TRANSFER.mastered,
+        [
+            [True, True, False],
+            [True, False, False],
+            [False, False, True],
+            [False, False, True],
+        ],
+    )
+    found = verdict(TRANSFER, 0)
+    assert found.home == 0.5
+    np.testing.assert_allclose(found.share.value, np.mean([1, 0.82, 0.4, 0.6]))
+    np.testing.assert_allclose(found.median_share, 0.71)
+    assert found.mastered.value == 0.5
+    assert found.mastered.low < 0.5 < found.mastered.high
+    # nothing kept of nothing, and no division by it
+    nothing = Transfer(np.zeros(1), np.zeros((2, 1)), np.zeros((2, 1)))
+    assert not nothing.share.any()
+    assert verdict(nothing, 0).mastered.value == 0
+
+
+def test_rank_correlations_of_hand_made_worlds():
+    found = rank_correlations(TRANSFER)
+    assert found is not None
+    # as home, as home, another order; the fourth says nothing
+    third = np.corrcoef([3, 2, 1], [1, 3, 2])[0, 1]
+    np.testing.assert_allclose(found["home"], (1 + 1 + third) / 3)
+    np.testing.assert_allclose(found["worlds"], (1 + third + third) / 3)
+    assert between_robots(TRANSFER, TRANSFER) == pytest.approx(1)
+    two = Transfer(np.ones(2), np.ones((3, 2)), np.ones((3, 2)))
+    assert rank_correlations(two) is between_robots(two, two) is None
+
+
+def test_the_document_says_who_kept_what():
+    names = ["a/seed-1", "a/seed-2", "b"]
+    groups = {"a": [0, 1], "b": [2]}
+    text = to_markdown(document(names, {"epuck": TRANSFER}, groups, 5, 7))
+    assert "3 policies, frozen, in 4 worlds" in text
+    assert "| a | a/seed-1 | 0.500 |" in text
+    assert "50% [15%, 85%]" in text
+    # kept 70.5 % and 77.5 %, mastered 50 % and 25 %
+    assert "| a | epuck | 2 | 0.450 | 79% | 0.2 | 38% |" in text
+    assert "Rank correlation" in text
+
+
+def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(command, "HOME_STARTS", 5)
+    output = tmp_path / "new" / "gap"
+    arguments = ["wall-follower", str(CHAMPION), "--output", str(output)]
+    small = ["--worlds", "3", "--starts", "2", "--robot", "epuck_planar"]
+    assert gap([*arguments, *small]) == 0
+    names = {path.name for path in output.iterdir()}
+    pictures = {"gap.png", "gap.svg", "gap.pdf"}
+    assert names == {"gap.md", "summary.md", "gap.json", "gap.csv", *pictures}
+    assert (output / "gap.md").read_text() in capsys.readouterr().out
+    record = json.loads((output / "gap.json").read_text())
+    assert len(record["worlds"]) == 3
+    policies = record["robots"]["epuck_planar"]
+    assert list(policies) == ["wall-follower", str(CHAMPION)]
+    with (output / "gap.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * 3
+    for row in rows:
+        there = policies[row["policy"]]["abroad"][int(row["world"])]["fitness"]
+        share = there / policies[row["policy"]]["home"]
+        assert float(row["share"]) == pytest.approx(share, abs=1e-4)
+        assert row["arena"] == record["worlds"][int(row["world"])]["arena"]
+    assert imread(output / "gap.png").shape[1] > 1000
+    first = (output / "gap.json").read_bytes()
+    assert gap([*arguments, *small]) == 0
+    assert (output / "gap.json").read_bytes() == first
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "expected run or study directories"),
+        (["nowhere"], "no champion in 'nowhere'"),
+        (["wall-follower", "--worlds", "1"], "2 to 1000 worlds, got 1"),
+        (["wall-follower", "--starts", "0"], "2 to 1000 starts, got 0"),
+        (["wall-follower", "--threads", "-1"], "threads"),
+        (["wall-follower", "--robot", "tank"], "no robot 'tank'"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, words, tmp_path):
+    with pytest.raises(UserError, match=words) as error:
+        gap([*arguments, "--output", str(tmp_path / "gap")])
+    assert "\n" not in str(error.value)
+
+
+def test_every_arena_of_the_worlds_is_shipped():
+    for arena in gap_worlds.ARENAS:
+        ((found,),) = abroad(
+            [FOLLOWER], [replace(HOME, arena=arena)], "epuck_planar", 2, 1
+        )
+        assert 0 <= found.fitness <= 1
