@@ -5,7 +5,7 @@ INSTALLED := .venv/.installed
 RUN := runs/de-best-seed-1
 CHAMPION := results/paper/de-best/seed-1
 
-.PHONY: run test bench convergence racing overhead bridge gap results figures clean
+.PHONY: run test bench convergence racing overhead recording bridge gap results figures clean
 
 run: $(INSTALLED)
 	@if [ -f $(RUN)/config.yaml ]; then \
@@ -31,6 +31,9 @@ racing: $(INSTALLED)
 
 overhead: $(INSTALLED)
 	$(BIN)/python -m benchmarks.study --json results/study.json
+
+recording: $(INSTALLED)
+	$(BIN)/python -m benchmarks.recording --json results/recording.json
 
 # the bridge against the emulated robot, two minutes in real time; wants an idle machine
 bridge: $(INSTALLED)

@@ -4,7 +4,7 @@ Made by `python -m epuck_mj.calibrate`, read by simulation and bridge alike.
 """
 
 import math
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Self
 
@@ -54,7 +54,12 @@ class Calibration:
         Raises:
             UserError: if that is not possible.
         """
-        content = asdict(self) | {"proximity_gains": list(self.proximity_gains)}
+        # plain floats: YAML knows no numpy
+        content = {
+            "proximity_gains": [float(gain) for gain in self.proximity_gains],
+            "wheel_radius": float(self.wheel_radius),
+            "track": float(self.track),
+        }
         with writing(path.parent):
             write_text(path, yaml.safe_dump(content, sort_keys=False))
 

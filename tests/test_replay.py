@@ -270,6 +270,12 @@ def test_a_robots_own_trajectory_needs_no_simulation(here):
     replace(trajectory, time=time).save("robot.npz")
     assert Trajectory.load("robot.npz").steps == 5
     assert list(shown("robot.npz").poses) == ["robot"]
+    for option in (
+        ["--trials", "2"],
+        ["--pose", "0", "0", "0"],
+        ["--generations", "0"],
+    ):
+        assert "expected a policy for --trials" in refused("robot.npz", *option)
 
 
 def test_a_viewer_opens_where_there_is_a_display(champion, here, monkeypatch, capsys):

@@ -5,20 +5,16 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import tyro
 
-from epuck_mj.bridge.connection import Connection
-from epuck_mj.bridge.link import Link, SerialPort, ports
+from epuck_mj.bridge.connect import connect
+from epuck_mj.bridge.link import ports
 from epuck_mj.bridge.log import log_name
 from epuck_mj.bridge.mission import Mission, accomplish
-from epuck_mj.bridge.protocol import RESYNC, ascii, packets
-from epuck_mj.bridge.serial_line import SerialLine
-from epuck_mj.bridge.wifi_line import WifiLine
 from epuck_mj.calibration import Calibration
 from epuck_mj.command_line import main, parse
-from epuck_mj.constants import SPEED_MAX, WIFI_PORT
+from epuck_mj.constants import SPEED_MAX
 from epuck_mj.control import Policy, TaskParameters
 from epuck_mj.controller import load
 from epuck_mj.errors import UserError
@@ -26,7 +22,6 @@ from epuck_mj.model import load_scene
 from epuck_mj.wall_follower import WallFollower
 
 MODULE = "epuck_mj.bridge"
-WIFI = "tcp://"
 YARDSTICK = "wall-follower"
 SECONDS_MAX = 24 * 3600
 
@@ -90,17 +85,7 @@ def bridge(argv: Sequence[str]) -> int:
         calibrate=options.calibrate,
         log=log_name(options.log),
     )
-    return accomplish(mission, lambda: _connect(options.port), time.monotonic)
-
-
-def _connect(port: str) -> Connection:
-    if port.startswith(WIFI):
-        name = f"socket://{port.removeprefix(WIFI)}"
-        if not urlsplit(name).netloc.rpartition("]")[2].count(":"):
-            name += f":{WIFI_PORT}"
-        return WifiLine(lambda: SerialPort(name, packets.command(0, 0)))
-    farewell = RESYNC.flush + ascii.stop().out
-    return SerialLine(Link(lambda: SerialPort(port, farewell)))
+    return accomplish(mission, lambda: connect(options.port), time.monotonic)
 
 
 def _check(options: Options) -> None:

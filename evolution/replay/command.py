@@ -120,6 +120,11 @@ def _starts(
     ways = (options.trials, options.starts, options.pose or None)
     if sum(way is not None for way in ways) > 1:
         raise UserError("expected one of --trials, --starts and --pose, got several")
+    if not policies and (any(ways) or options.generations is not None):
+        raise UserError(
+            "expected a policy for --trials, --starts, --pose or --generations: a "
+            "recorded trajectory is what it is"
+        )
     if options.pose:
         if len(options.pose) != 3 or not np.isfinite(options.pose).all():
             raise UserError(

@@ -85,7 +85,10 @@ def from_file(path: str) -> Trial:
     Raises:
         UserError: if it is none.
     """
-    return Trial(Path(path).stem, Trajectory.load(path), TaskParameters())
+    trajectory = Trajectory.load(path)
+    # a trajectory does not say how long it might have been
+    task = TaskParameters(steps=max(1, trajectory.steps))
+    return Trial(Path(path).stem, trajectory, task)
 
 
 def labels(policies: Sequence[NamedPolicy]) -> list[str]:

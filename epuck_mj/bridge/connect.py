@@ -1,0 +1,28 @@
+"""A connection by the port's name: over a serial line, or to an e-puck2 over WiFi."""
+
+from urllib.parse import urlsplit
+
+from epuck_mj.bridge.connection import Connection
+from epuck_mj.bridge.link import Link, SerialPort
+from epuck_mj.bridge.protocol import RESYNC, ascii, packets
+from epuck_mj.bridge.serial_line import SerialLine
+from epuck_mj.bridge.wifi_line import WifiLine
+from epuck_mj.constants import WIFI_PORT
+
+WIFI = "tcp://"
+"""What the name of a WiFi robot begins with."""
+
+
+def connect(port: str) -> Connection:
+    """A connection to the robot at a port; nothing is opened yet.
+
+    Args:
+        port: `/dev/rfcomm0`, `COM5`, `socket://host:port`, or `tcp://host[:port]`.
+    """
+    if port.startswith(WIFI):
+        name = f"socket://{port.removeprefix(WIFI)}"
+        if not urlsplit(name).netloc.rpartition("]")[2].count(":"):
+            name += f":{WIFI_PORT}"
+        return WifiLine(lambda: SerialPort(name, packets.command(0, 0)))
+    farewell = RESYNC.flush + ascii.stop().out
+    return SerialLine(Link(lambda: SerialPort(port, farewell)))

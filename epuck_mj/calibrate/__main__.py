@@ -1,0 +1,126 @@
+"""A robot is calibrated: `python -m epuck_mj.calibrate --port PORT`."""
+
+import os
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from epuck_mj.bridge.connect import connect
+from epuck_mj.bridge.connection import Clock, Connection
+from epuck_mj.bridge.errors import BridgeError, StillMoving
+from epuck_mj.bridge.interruption import Interrupted, Interruption
+from epuck_mj.bridge.mission import DONE, FAILED, RUNAWAY
+from epuck_mj.calibrate.guide import STEPS, Person
+from epuck_mj.calibrate.measure import Bench
+from epuck_mj.calibration import Calibration
+from epuck_mj.command_line import main, parse
+from epuck_mj.errors import UserError
+from epuck_mj.files import is_directory, is_file
+
+MODULE = "epuck_mj.calibrate"
+
+
+@dataclass(frozen=True)
+class Options:
+    """Measure in what a robot differs from the robot of the books, step by step.
+
+    Needs a ruler, a protractor, a flat wall and spacers of 10, 20 and 30 mm.
+
+    Attributes:
+        port: of the robot, as for the bridge.
+        output: file to write; what is in it and is not measured now stays.
+        only: the one step to do, instead of straight, turn and sensors.
+    """
+
+    port: str = ""
+    output: Path = Path("robot.yaml")
+    only: Literal["straight", "turn", "sensors"] | None = None
+
+
+def calibrate(argv: Sequence[str], ask: Callable[[str], str] = input) -> int:
+    """Run the command line; its exit status.
+
+    Args:
+        argv: what was typed.
+        ask: shows a question and gives the answer.
+
+    Raises:
+        UserError: for anything the user can put right.
+    """
+    options = parse(Options, f"python -m {MODULE}", argv)
+    if not options.port:
+        raise UserError("expected --port, as for python -m epuck_mj.bridge")
+    steps = tuple(STEPS) if options.only is None else (options.only,)
+    return accomplish(steps, options.output, lambda: connect(options.port), ask)
+
+
+def accomplish(
+    steps: Sequence[str],
+    output: Path,
+    connect: Callable[[], Connection],
+    ask: Callable[[str], str],
+    clock: Clock = time.monotonic,
+    sleep: Callable[[float], None] = time.sleep,
+) -> int:
+    """Calibrate, writing the file after each step; the exit status, as the bridge's.
+
+    Args:
+        steps: names of STEPS.
+        output: file to write, or to extend.
+        connect: opens the way to the robot.
+        ask: shows a question and gives the answer.
+        clock: what the connection tells times by.
+        sleep: lets so many seconds go by.
+
+    Raises:
+        UserError: if something cannot be; the robot stands.
+    """
+    known = _known(output)
+    status, word = DONE, ""
+    with Interruption() as interruption:
+        bench = Bench(connect, interruption, clock, sleep)
+        person = Person(ask, interruption)
+        print("The robot drives. Ctrl-C stops it and ends.", flush=True)
+        try:
+            for step in steps:
+                known = STEPS[step](bench, person, known)
+                known.save(output)
+                print(f"written: {output}", flush=True)
+        except Interrupted:
+            pass
+        except StillMoving as error:
+            status = RUNAWAY
+            word = f"error: THE MOTORS MAY STILL TURN, switch the robot off: {error}"
+        except BridgeError as error:
+            status, word = FAILED, f"error: {error}; the robot stands still"
+        if interruption.signum is not None and status != RUNAWAY:
+            status = 128 + interruption.signum
+            word = f"{interruption.signum.name}: ended, the robot stands still"
+        if word:
+            # a question may stand there unanswered
+            print(flush=True)
+            print(word, file=sys.stderr, flush=True)
+    return status
+
+
+def _known(output: Path) -> Calibration:
+    """What the file says that will be written; the robot of the books if there is none.
+
+    Raises:
+        UserError: if it is something else, or cannot be written: better now than when
+            the robot has driven.
+    """
+    if is_directory(output):
+        raise UserError(f"cannot write '{output}': it is a folder")
+    if not is_directory(output.parent):
+        raise UserError(f"cannot write '{output}': no folder '{output.parent}'")
+    if not os.access(output.parent, os.W_OK):
+        raise UserError(f"cannot write '{output}': permission denied")
+    return Calibration.load(output) if is_file(output) else Calibration()
+
+
+if __name__ == "__main__":
+    main(calibrate)

@@ -1,0 +1,175 @@
+"""From what was measured to a robot's sensor gains, wheel radius and track.
+
+What no e-puck has is refused: then something was measured wrongly.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from epuck_mj.errors import UserError
+from epuck_mj.motors import STEP_ANGLE
+from epuck_mj.sensors import proximity
+
+WHEEL_RADII = (0.015, 0.025)
+TRACKS = (0.045, 0.065)
+"""From where to where e-pucks have them [m]. Chosen: 20 % and more beyond any known."""
+
+GAINS = (0.2, 5.0)
+"""The same of the sensors' gains. Chosen: known ones are 0.6 to 1.5."""
+
+SATURATED = 3700
+"""Counts from which a sensor says nothing of the distance.
+
+Chosen: sensors that touch a wall read 3775 to 3863. JBOTEVOLVER.
+"""
+
+FLOOR_MAX = 30
+"""Counts of a sensor that sees nothing, if its zero is set. Chosen."""
+
+WINDOW = math.radians(6)
+"""Turn in which a sensor faces a wall squarely [rad].
+
+The ray is less than 0.1 mm longer at its ends, at a clearance of 30 mm.
+"""
+
+N_READINGS = 3
+"""Fewest readings in such a window."""
+
+
+@dataclass(frozen=True, eq=False)
+class SensorFit:
+    """How the sensors differ from the mean one.
+
+    Attributes:
+        gains: of each sensor, `(8,)`.
+        residuals: root mean square of what is left, relative to the counts, `(8,)`.
+        used: whether a peak went into the fit, `(distances, 8)`; saturated ones do not.
+    """
+
+    gains: np.ndarray
+    residuals: np.ndarray
+    used: np.ndarray
+
+
+def peaks(yaw: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Counts of each sensor while it faced the wall squarely, `(8,)`.
+
+    The highest of the medians of readings that are close together: single readings may
+    be wrong, and the highest of many noisy ones is too high.
+
+    The sensors sit on the shell's rim and look away from the axle's middle, about which
+    the robot turns: so a ray is shortest where it meets the wall squarely, and then as
+    long as the clearance. Where directions and places are published apart, they differ
+    by up to 3 degrees, which makes that less than 0.1 mm. WEBOTS.
+
+    Args:
+        yaw: of the robot at each reading, not wrapped [rad], `(n,)`.
+        counts: `(n, 8)`, of a full turn or more.
+
+    Raises:
+        UserError: if readings are too far apart, or a sensor sees something everywhere.
+    """
+    _check_floor(np.median(counts, axis=0))
+    first, last = yaw.min() + WINDOW / 2, yaw.max() - WINDOW / 2
+    windows = [np.abs(yaw - middle) <= WINDOW / 2 for middle in yaw]
+    medians = [
+        np.median(counts[near], axis=0)
+        for middle, near in zip(yaw, windows, strict=True)
+        if first <= middle <= last and near.sum() >= N_READINGS
+    ]
+    if not medians:
+        most = max(int(near.sum()) for near in windows)
+        raise UserError(
+            f"expected {N_READINGS} readings in {math.degrees(WINDOW):.0f} degrees of "
+            f"turn, got {most}: the link is too slow"
+        )
+    return np.max(medians, axis=0)
+
+
+def fit_gains(clearances: np.ndarray, counts: np.ndarray) -> SensorFit:
+    """Gains with which the mean sensor's curve comes closest to the peaks.
+
+    Least squares in the logarithm: of a factor that is the same at all distances, the
+    mean of what the peaks say.
+
+    Args:
+        clearances: between shell and wall [m], `(distances,)`.
+        counts: peaks, `(distances, 8)`.
+
+    Raises:
+        UserError: if a sensor was always saturated, or no e-puck has such gains.
+    """
+    mean_sensor = proximity(clearances)[:, None]
+    used = counts < SATURATED
+    n_used = used.sum(axis=0)
+    if not n_used.all():
+        names = ", ".join(f"ps{number}" for number in np.flatnonzero(n_used == 0))
+        raise UserError(
+            f"expected peaks below {SATURATED} counts at some distance, "
+            f"got none of {names}"
+        )
+    logs = np.where(used, np.log(np.maximum(counts, 1.0) / mean_sensor), 0.0)
+    fitted = logs.sum(axis=0) / n_used
+    left = np.where(used, logs - fitted, 0.0)
+    gains = np.exp(fitted)
+    for number, gain in enumerate(gains):
+        _check(f"the gain of ps{number}", float(gain), GAINS, "")
+    return SensorFit(gains, np.sqrt((left**2).sum(axis=0) / n_used), used)
+
+
+def fit_wheel_radius(steps: float, length: float) -> float:
+    """On which the robot rolls [m].
+
+    Args:
+        steps: that each motor made.
+        length: of the way [m].
+
+    Raises:
+        UserError: if no e-puck has such wheels.
+    """
+    radius = length / (steps * STEP_ANGLE)
+    _check("a wheel radius", 1000 * radius, _millimetres(WHEEL_RADII), " mm")
+    return radius
+
+
+def fit_track(steps: float, wheel_radius: float, angle: float) -> float:
+    """Effective distance of the wheels [m].
+
+    Args:
+        steps: that each motor made, one forward, one backward.
+        wheel_radius: [m].
+        angle: by which the robot turned on the spot [rad].
+
+    Raises:
+        UserError: if no e-puck has such a track.
+    """
+    if angle <= 0:
+        raise UserError(f"expected a turn to the left, got {math.degrees(angle):.0f}")
+    track = 2 * steps * STEP_ANGLE * wheel_radius / angle
+    _check("a track", 1000 * track, _millimetres(TRACKS), " mm")
+    return track
+
+
+def _check(what: str, value: float, limits: tuple[float, float], unit: str) -> None:
+    low, high = limits
+    if not low <= value <= high:
+        raise UserError(
+            f"expected {what} from {low:g} to {high:g}{unit}, "
+            f"measured {value:.3g}{unit}"
+        )
+
+
+def _check_floor(floor: np.ndarray) -> None:
+    """Refuse sensors that see something where there is nothing."""
+    if floor.max() > FLOOR_MAX:
+        raise UserError(
+            f"expected up to {FLOOR_MAX} counts away from the wall, "
+            f"got {floor.max():.0f} of ps{floor.argmax()}: "
+            "the zero is not set, or something else is near"
+        )
+
+
+def _millimetres(limits: tuple[float, float]) -> tuple[float, float]:
+    return 1000 * limits[0], 1000 * limits[1]

@@ -1,0 +1,187 @@
+"""What a person is told to do, and asked, while a robot is calibrated."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from epuck_mj.bridge.interruption import Interruption
+from epuck_mj.calibrate import measure
+from epuck_mj.calibrate.fitting import (
+    SATURATED,
+    SensorFit,
+    fit_gains,
+    fit_track,
+    fit_wheel_radius,
+    peaks,
+)
+from epuck_mj.calibrate.measure import Bench
+from epuck_mj.calibration import Calibration
+from epuck_mj.constants import N_PROXIMITY
+from epuck_mj.errors import UserError
+from epuck_mj.motors import STEP_ANGLE
+
+CLEARANCES = (0.010, 0.020, 0.030)
+"""Between shell and wall [m]: where sensors are good, and do not saturate."""
+
+RESIDUAL_MAX = 0.25
+"""A sensor that deviates more from the curve is worth a word. Chosen."""
+
+LENGTHS = (0.05, 2.0)
+"""What a ruler can have shown [m]; others are taken for slips of the pen."""
+
+MISSES = (-360.0, 360.0)
+"""The same of a protractor [degrees]."""
+
+
+class Person:
+    """Who is at the robot."""
+
+    def __init__(self, ask: Callable[[str], str], interruption: Interruption) -> None:
+        """Nothing is asked yet.
+
+        Args:
+            ask: shows a question and gives the answer, as `input` does.
+            interruption: what ends the waiting.
+        """
+        self._ask = ask
+        self._interruption = interruption
+
+    def ready(self, what: str) -> None:
+        """Wait until something is done.
+
+        Raises:
+            UserError: if nobody answers any more.
+        """
+        self._answer(f"{what}\nThen press Enter: ")
+
+    def agrees(self, question: str) -> bool:
+        """Yes or no.
+
+        Raises:
+            UserError: if nobody answers any more.
+        """
+        while True:
+            answer = self._answer(f"{question} [y/n]: ").lower()
+            if answer in ("y", "yes", "n", "no"):
+                return answer.startswith("y")
+            _say(f"expected y or n, got '{answer}'")
+
+    def number(self, question: str, low: float, high: float) -> float:
+        """A number within limits; asked again until there is one.
+
+        Raises:
+            UserError: if nobody answers any more.
+        """
+        while True:
+            answer = self._answer(f"{question}: ")
+            try:
+                value = float(answer.replace(",", "."))
+            except ValueError:
+                value = math.nan
+            if low <= value <= high:
+                return value
+            _say(f"expected a number from {low:g} to {high:g}, got '{answer}'")
+
+    def _answer(self, question: str) -> str:
+        try:
+            with self._interruption.raising():
+                return self._ask(question).strip()
+        except EOFError:
+            # the question's line is not ended
+            _say("")
+            last = question.splitlines()[-1].strip(": ")
+            raise UserError(
+                f"expected an answer to '{last}', got the end of the input"
+            ) from None
+
+
+def straight(bench: Bench, person: Person, known: Calibration) -> Calibration:
+    """With the wheel radius by a ruler."""
+    step_length = STEP_ANGLE * known.wheel_radius
+    _say("\nWheel radius: the robot drives straight on, you measure how far.")
+    clear = measure.N_STEPS * step_length + 0.15
+    person.ready(f"Mark where its front is; leave {clear:.1f} m clear before it.")
+    steps = measure.straight(bench, known)
+    _say(f"It stands. Each wheel made {steps:.0f} steps.")
+    length = person.number("How far did it go, in metres", *LENGTHS)
+    radius = fit_wheel_radius(steps, length)
+    _say(f"wheel radius {1000 * radius:.2f} mm; before {1000 * known.wheel_radius:.2f}")
+    return replace(known, wheel_radius=radius)
+
+
+def turn(bench: Bench, person: Person, known: Calibration) -> Calibration:
+    """With the track by a protractor."""
+    _say(
+        f"\nTrack: the robot turns {measure.N_TURNS} times to the left, on the spot;\n"
+        "you measure by how much its front misses where it was."
+    )
+    person.ready("Mark where its front points; leave 5 cm clear around it.")
+    steps = measure.turn(bench, known)
+    _say(f"It stands. Each wheel made {steps:.0f} steps.")
+    _say("By how many degrees does its front miss the mark?")
+    miss = person.number("Too far is above 0, not far enough is below 0", *MISSES)
+    angle = 2 * math.pi * measure.N_TURNS + math.radians(miss)
+    track = fit_track(steps, known.wheel_radius, angle)
+    _say(f"track {1000 * track:.2f} mm; before {1000 * known.track:.2f}")
+    return replace(known, track=track)
+
+
+def sensors(bench: Bench, person: Person, known: Calibration) -> Calibration:
+    """With the gains of the proximity sensors."""
+    _say("\nSensors: the robot turns slowly on the spot, at several distances")
+    _say("from a flat wall which is 20 cm long or longer.")
+    if person.agrees("Set the sensors' zero? They forget it when switched off"):
+        person.ready("Leave 20 cm clear around it.")
+        measure.zero(bench, known)
+        _say("The zero is set.")
+    rows = []
+    for clearance in CLEARANCES:
+        person.ready(
+            f"Put it to the wall, {1000 * clearance:.0f} mm of air between shell and "
+            "wall;\ntake the spacer away, leave 20 cm clear elsewhere."
+        )
+        rows.append(peaks(*measure.look_around(bench, known)))
+        _say("It stands.")
+    counts = np.array(rows)
+    fit = fit_gains(np.array(CLEARANCES), counts)
+    _say(table(counts, fit))
+    return replace(known, proximity_gains=tuple(map(float, fit.gains)))
+
+
+def table(counts: np.ndarray, fit: SensorFit) -> str:
+    """Peaks, gains and residuals, a sensor a line, and what to think of them.
+
+    Args:
+        counts: peaks at CLEARANCES, `(distances, 8)`.
+        fit: of these.
+    """
+    heads = [f"{1000 * clearance:.0f} mm" for clearance in CLEARANCES]
+    lines = ["     " + "".join(f"{head:>8}" for head in heads) + "    gain  residual"]
+    for number in range(N_PROXIMITY):
+        peaks_seen = "".join(f"{count:8.0f}" for count in counts[:, number])
+        gain, residual = fit.gains[number], 100 * fit.residuals[number]
+        lines.append(f"ps{number}  {peaks_seen}{gain:8.3f}{residual:8.1f} %")
+    for number in range(N_PROXIMITY):
+        if fit.residuals[number] > RESIDUAL_MAX:
+            lines.append(
+                f"warning: ps{number} deviates by {100 * fit.residuals[number]:.0f} % "
+                "from the curve: check the distances, or its window"
+            )
+        saturated = ~fit.used[:, number]
+        if saturated.any():
+            where = ", ".join(np.array(heads)[saturated])
+            lines.append(
+                f"warning: ps{number} is saturated ({SATURATED} counts and more) at "
+                f"{where}: left out"
+            )
+    return "\n".join(lines)
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
+
+
+STEPS = {"straight": straight, "turn": turn, "sensors": sensors}
+"""In the order in which each is of use to the next."""

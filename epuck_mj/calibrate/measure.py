@@ -1,0 +1,200 @@
+"""A robot drives a little and is read, through the bridge and as safe as there.
+
+Each drive has the connection to itself: it opens it, sees that the robot stands,
+drives, stops it whatever happened, and lets go. While a person is at the robot, nobody
+is connected to it.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from epuck_mj.bridge.connection import Clock, Connection
+from epuck_mj.bridge.errors import BridgeError, StillMoving
+from epuck_mj.bridge.interruption import Interruption
+from epuck_mj.bridge.robot import RealRobot
+from epuck_mj.calibration import Calibration
+from epuck_mj.errors import UserError
+from epuck_mj.motors import STEP_ANGLE
+
+T = TypeVar("T")
+
+PERIOD = 0.02
+"""Time between two readings [s], if the link is fast enough.
+
+A little more than PROXIMITY_PERIOD: more readings would tell the same again.
+"""
+
+RATE = 300
+"""Of the wheels where only the way counts [steps/s]."""
+
+N_STEPS = 4000
+"""Way straight on: 0.52 m, of which a ruler's millimetre is 0.2 %."""
+
+N_TURNS = 3
+"""Turns on the spot, of which one degree is 0.1 %."""
+
+SPACING = math.radians(1)
+"""Turn between two readings of the sensors [rad]."""
+
+MORE_THAN_A_TURN = 1.1
+"""Turns while the sensors are read, as far as the track is known."""
+
+N_LOOKS = 10
+"""Readings by which the link's pace is judged."""
+
+N_REST = 5
+"""Readings of a robot that was told to stand, until its counters are at rest."""
+
+SPARE_TIME = 5.0
+"""A drive that takes twice its time and this [s] more has failed. Chosen."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """How to reach the robot.
+
+    Attributes:
+        connect: opens the way to it.
+        interruption: what ends a drive before its time.
+        clock: what the connection tells times by [s].
+        sleep: lets so many seconds go by.
+    """
+
+    connect: Callable[[], Connection]
+    interruption: Interruption
+    clock: Clock
+    sleep: Callable[[float], None]
+
+    def with_robot(self, calibration: Calibration, job: Callable[[RealRobot], T]) -> T:
+        """What a job gives; then the robot stands, and said so.
+
+        Args:
+            calibration: what is known of the robot.
+            job: called with the robot, which has greeted.
+
+        Raises:
+            UserError: if there is no robot.
+            BridgeError: if it does not do what it is told.
+            Interrupted: by a signal.
+        """
+        with self.interruption.raising():
+            connection = self.connect()
+        robot = RealRobot(
+            connection, calibration, PERIOD, clock=self.clock, sleep=self.sleep
+        )
+        # however the inner block ends, the outer one stops the robot
+        with robot, self.interruption.raising():
+            try:
+                robot.greet()
+            except StillMoving:
+                raise
+            except BridgeError as error:
+                raise UserError(str(error)) from None
+            return job(robot)
+
+
+def zero(bench: Bench, calibration: Calibration) -> None:
+    """Let the sensors read zero for what they see now."""
+    bench.with_robot(calibration, RealRobot.calibrate)
+
+
+def straight(bench: Bench, calibration: Calibration) -> float:
+    """Drive straight on for about N_STEPS; the steps that the motors made."""
+
+    def job(robot: RealRobot) -> float:
+        robot.begin()
+        _drive(robot, (RATE, RATE), lambda: _rolled(robot, calibration), N_STEPS)
+        return _rolled(robot, calibration)
+
+    return bench.with_robot(calibration, job)
+
+
+def turn(bench: Bench, calibration: Calibration) -> float:
+    """Turn left for about N_TURNS; the steps that each motor made."""
+
+    def job(robot: RealRobot) -> float:
+        robot.begin()
+        steps = N_TURNS * steps_per_turn(calibration)
+        _drive(robot, (-RATE, RATE), lambda: _turned(robot, calibration), steps)
+        return _turned(robot, calibration)
+
+    return bench.with_robot(calibration, job)
+
+
+def look_around(
+    bench: Bench, calibration: Calibration
+) -> tuple[np.ndarray, np.ndarray]:
+    """Turn left, slowly, by more than a full turn.
+
+    Returns:
+        Yaw at each reading, not wrapped [rad], `(n,)`; counts then, `(n, 8)`.
+    """
+
+    def job(robot: RealRobot) -> tuple[np.ndarray, np.ndarray]:
+        # a slow link makes a slow turn
+        robot.begin()
+        times = [robot.last.time]
+        for _ in range(N_LOOKS):
+            robot.step(np.zeros(2))
+            times.append(robot.last.time)
+        period = float(np.median(np.diff(times)))
+        per_turn = steps_per_turn(calibration)
+        rate = max(1, round(SPACING / period * per_turn / (2 * math.pi)))
+        yaws, counts = [], []
+
+        def made() -> float:
+            yaws.append(robot.last.pose[2])
+            counts.append(robot.last.proximity)
+            return _turned(robot, calibration)
+
+        _drive(robot, (-rate, rate), made, MORE_THAN_A_TURN * per_turn)
+        return np.array(yaws), np.array(counts)
+
+    return bench.with_robot(calibration, job)
+
+
+def steps_per_turn(calibration: Calibration) -> float:
+    """Of each motor, one forward, one backward."""
+    return math.pi * calibration.track / (calibration.wheel_radius * STEP_ANGLE)
+
+
+def _rolled(robot: RealRobot, calibration: Calibration) -> float:
+    """Steps, in the mean of both motors, that odometry's length is made of."""
+    return float(robot.odometry.length) / (STEP_ANGLE * calibration.wheel_radius)
+
+
+def _turned(robot: RealRobot, calibration: Calibration) -> float:
+    """Steps of each motor that odometry's yaw is made of."""
+    return float(robot.odometry.pose[2]) / (2 * math.pi) * steps_per_turn(calibration)
+
+
+def _drive(
+    robot: RealRobot,
+    rates: tuple[int, int],
+    made: Callable[[], float],
+    steps: float,
+) -> None:
+    """Drive until so many steps are made, then stand.
+
+    Args:
+        robot: that has begun.
+        rates: of the wheels [steps/s].
+        made: asked at each reading for the steps so far.
+        steps: how many are wanted.
+
+    Raises:
+        BridgeError: if the motors do not make them in time.
+    """
+    command = np.array(rates) * STEP_ANGLE
+    patience = 2 * steps / max(rates) + SPARE_TIME
+    deadline = robot.last.time + patience
+    while (so_far := made()) < steps:
+        if robot.last.time > deadline:
+            raise BridgeError(f"{steps:.0f} steps in {patience:.0f} s", f"{so_far:.0f}")
+        robot.step(command)
+    for _ in range(N_REST):
+        robot.step(np.zeros(2))

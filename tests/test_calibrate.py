@@ -1,0 +1,662 @@
+"""`python -m epuck_mj.calibrate`: its arithmetic, and whole calibrations of fakes."""
+
+import dataclasses
+import math
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+
+import mujoco
+import numpy as np
+import pytest
+
+from epuck_mj.bridge.fake.body import MujocoBody
+from epuck_mj.bridge.fake.emulator import Emulator
+from epuck_mj.bridge.fake.endpoints import Pty, serve
+from epuck_mj.bridge.fake.scenarios import scenario
+from epuck_mj.bridge.fake.virtual import VirtualPort, VirtualTime
+from epuck_mj.bridge.interruption import SIGNALS
+from epuck_mj.bridge.link import Link
+from epuck_mj.bridge.serial_line import SerialLine
+from epuck_mj.bridge.wifi_line import WifiLine
+from epuck_mj.calibrate.__main__ import accomplish, calibrate
+from epuck_mj.calibrate.fitting import (
+    SATURATED,
+    fit_gains,
+    fit_track,
+    fit_wheel_radius,
+    peaks,
+)
+from epuck_mj.calibrate.guide import CLEARANCES, STEPS, table
+from epuck_mj.calibration import Calibration
+from epuck_mj.constants import (
+    BODY_RADIUS,
+    N_PROXIMITY,
+    PROXIMITY_ANGLES,
+    PROXIMITY_COUNT_MAX,
+    TRACK,
+    WHEEL_RADIUS,
+)
+from epuck_mj.disturbances import Noise, calibrated
+from epuck_mj.disturbed_robots import DisturbedRobots
+from epuck_mj.errors import UserError
+from epuck_mj.model import MODELS, load_scene
+from epuck_mj.motors import STEP_ANGLE
+from epuck_mj.sensors import counted, proximity
+from epuck_mj.simulation import SimulatedRobots
+from tests.test_bridge import BUSY
+from tests.test_fake import PATIENCE, living, wait_for
+
+GAINS = np.array([0.62, 1.45, 0.9, 1.1, 0.75, 1.3, 1.0, 1.2])
+CENTRE = (0.0, 0.0, 0.0)
+WALL = 0.5
+DISTANCES = np.array(CLEARANCES)
+
+
+# arithmetic
+
+
+def seen_on_a_turn(clearance, gains, noise, rng, spacing=1.0):
+    """Yaw `(n,)` and counts `(n, 8)` of a robot that turns beside a straight wall."""
+    yaw = np.radians(np.arange(0, 396, spacing))
+    facing = np.cos(yaw[:, None] + np.radians(PROXIMITY_ANGLES))
+    with np.errstate(divide="ignore"):
+        distance = (BODY_RADIUS + clearance) / facing - BODY_RADIUS
+    distance = np.where(facing > 0, distance, -1.0)
+    deviations = noise * rng.standard_normal(distance.shape)
+    return yaw, counted(distance, gains, deviations)
+
+
+def test_gains_of_exact_peaks():
+    for gains in (np.ones(N_PROXIMITY), GAINS, GAINS[::-1]):
+        fit = fit_gains(DISTANCES, proximity(DISTANCES)[:, None] * gains)
+        np.testing.assert_allclose(fit.gains, gains)
+        np.testing.assert_allclose(fit.residuals, 0, atol=1e-12)
+        assert fit.used.all()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_gains_of_noisy_turns(seed):
+    rng = np.random.default_rng(seed)
+    gains = np.exp(rng.uniform(math.log(0.6), math.log(1.5), N_PROXIMITY))
+    turns = [seen_on_a_turn(distance, gains, 1.0, rng) for distance in DISTANCES]
+    fit = fit_gains(DISTANCES, np.array([peaks(*turn) for turn in turns]))
+    np.testing.assert_allclose(fit.gains, gains, rtol=0.02)
+    assert fit.residuals.max() < 0.04
+
+
+def test_peaks_withstand_single_wrong_readings():
+    rng = np.random.default_rng(0)
+    yaw, counts = seen_on_a_turn(0.02, 1.0, 0.0, rng)
+    right = peaks(yaw, counts)
+    np.testing.assert_allclose(right, proximity(np.array(0.02)), rtol=0.01)
+    for row in range(0, len(yaw), 40):
+        counts[row] = PROXIMITY_COUNT_MAX
+    np.testing.assert_allclose(peaks(yaw, counts), right, rtol=0.01)
+
+
+def test_peaks_of_readings_too_few():
+    yaw, counts = seen_on_a_turn(0.02, 1.0, 0.0, np.random.default_rng(0), 4.0)
+    with pytest.raises(UserError, match=r"expected 3 readings in 6 degrees.*got 1"):
+        peaks(yaw, counts)
+
+
+def test_peaks_of_sensors_without_zero():
+    yaw, counts = seen_on_a_turn(0.02, 1.0, 0.0, np.random.default_rng(0))
+    counts[:, 3] += 80
+    with pytest.raises(UserError, match="got 80 of ps3: the zero is not set"):
+        peaks(yaw, counts)
+
+
+def test_saturated_peaks_are_left_out():
+    gains = np.array([1.0, 3.0, *np.ones(6)])
+    counts = np.minimum(proximity(DISTANCES)[:, None] * gains, PROXIMITY_COUNT_MAX)
+    fit = fit_gains(DISTANCES, counts)
+    assert not fit.used[0, 1]
+    np.testing.assert_allclose(fit.gains, gains)
+    assert f"ps1 is saturated ({SATURATED} counts and more) at 10 mm: left out" in (
+        table(counts, fit)
+    )
+    counts[:, 1] = PROXIMITY_COUNT_MAX
+    with pytest.raises(UserError, match="got none of ps1"):
+        fit_gains(DISTANCES, counts)
+
+
+def test_sensors_that_do_not_follow_the_curve():
+    counts = np.tile(proximity(DISTANCES)[:, None], N_PROXIMITY)
+    # as if the robot had never been moved
+    counts[:, 6] = counts[1, 6]
+    fit = fit_gains(DISTANCES, counts)
+    assert fit.residuals[6] > 0.8
+    assert "warning: ps6 deviates by" in table(counts, fit)
+    assert table(counts, fit).count("warning") == 1
+
+
+@pytest.mark.parametrize("gain", [0.0, 0.19, 5.1])
+def test_gains_that_no_robot_has(gain):
+    counts = np.tile(proximity(DISTANCES)[:, None], N_PROXIMITY)
+    counts[:, 4] = np.minimum(gain * counts[:, 4], SATURATED - 1)
+    counts[:2, 4] *= gain < 1
+    counts[:2, 4] += SATURATED * (gain > 1)
+    with pytest.raises(UserError, match=r"the gain of ps4 from 0\.2 to 5, measured"):
+        fit_gains(DISTANCES, counts)
+
+
+@pytest.mark.parametrize(
+    ("radius", "track"), [(WHEEL_RADIUS, TRACK), (0.0200, 0.0569), (0.0207, 0.051)]
+)
+def test_wheels(radius, track):
+    assert fit_wheel_radius(4000, 4000 * STEP_ANGLE * radius) == pytest.approx(radius)
+    angle = math.radians(3 * 360 - 20)
+    steps = angle * track / 2 / (STEP_ANGLE * radius)
+    assert fit_track(steps, radius, angle) == pytest.approx(track)
+
+
+def test_wheels_that_no_robot_has():
+    with pytest.raises(UserError, match=r"wheel radius from 15 to 25 mm, measured 10"):
+        fit_wheel_radius(1000, 0.063)
+    with pytest.raises(UserError, match=r"a track from 45 to 65 mm, measured 106 mm"):
+        fit_track(323, WHEEL_RADIUS, math.pi / 4)
+    with pytest.raises(UserError, match="expected a turn to the left"):
+        fit_track(323, WHEEL_RADIUS, -1.0)
+
+
+@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
+def test_rays_are_shortest_where_a_wall_is_faced(robot):
+    scene = load_scene(robot, "arena")
+    data = mujoco.MjData(scene.model)
+    x = WALL - BODY_RADIUS - 0.02
+    for yaw_wanted, number in zip(-np.radians(PROXIMITY_ANGLES), range(8), strict=True):
+        distances = []
+        for yaw in yaw_wanted + np.radians([-3, 0, 3]):
+            data.qpos[:] = scene.qpos(np.array([x, 0.0, yaw]))
+            mujoco.mj_forward(scene.model, data)
+            distances.append(scene.reading(data.sensordata).distance[number])
+        assert distances[1] == pytest.approx(0.02, abs=1e-5)
+        assert 0 < distances[0] - distances[1] < 1e-4
+        assert 0 < distances[2] - distances[1] < 1e-4
+
+
+# whole calibrations
+
+
+class Body(MujocoBody):
+    """An e-puck of its own: sensors with gains, offsets and noise; can be lifted."""
+
+    gains = np.ones(N_PROXIMITY)
+    offset = 0
+    noise = 0.0
+
+    def __init__(self, scene, start, now):
+        self.lock = threading.Lock()
+        self.rng = np.random.default_rng(0)
+        super().__init__(scene, start, now)
+
+    def advance(self, now):
+        with self.lock:
+            super().advance(now)
+
+    def proximity(self):
+        deviations = self.noise * self.rng.standard_normal(N_PROXIMITY)
+        counts = counted(self._reading().distance, self.gains, deviations)
+        return np.minimum(counts.astype(int) + self.offset, PROXIMITY_COUNT_MAX)
+
+    def place(self, pose):
+        with self.lock:
+            self._data.qpos[:] = self._scene.qpos(np.array(pose, float))
+            self._data.qvel[:] = 0
+            mujoco.mj_step1(self._scene.model, self._data)
+            self._note()
+
+
+class Person:
+    """Somebody who does what is asked, and whose ruler is exact."""
+
+    def __init__(self, body, settle, changes=()):
+        self.body = body
+        self.settle = settle
+        self.changes = dict(changes)
+        self.asked = []
+
+    def __call__(self, question):
+        self.asked.append(question)
+        print(question)
+        for part, answers in self.changes.items():
+            if part in question and answers:
+                return answers.pop(0)()
+        self.settle()
+        if "m clear before" in question:
+            self.mark((-0.3, 0.0, 0.0))
+        elif "5 cm clear" in question or "20 cm clear around" in question:
+            self.mark(CENTRE)
+        elif found := re.search(r"(\d+) mm of air", question):
+            self.at_wall(int(found[1]) / 1000)
+        elif "metres" in question:
+            return str(np.linalg.norm(self.body.pose[:2] - self.start[:2]))
+        elif "above 0" in question:
+            yaw = np.unwrap([pose[2] for pose in self.body.journal.pose[self.since :]])
+            return f"{math.degrees(yaw[-1] - yaw[0]) - 3 * 360:.1f}"
+        elif "[y/n]" in question:
+            return "y"
+        return ""
+
+    def at_wall(self, clearance):
+        self.mark((WALL - BODY_RADIUS - clearance, 0.05, 0.5))
+        return ""
+
+    def mark(self, pose):
+        self.body.place(pose)
+        self.settle()
+        self.start, self.since = self.body.pose, len(self.body.journal.pose) - 1
+
+
+class World:
+    """A fake robot and a person in virtual time."""
+
+    def __init__(self, scene, gains=None, faults="", robot="asercom", latency=0.0):
+        self.time, self.wifi = VirtualTime(), robot == "wifi"
+        self.body = Body(scene, np.zeros(3), 0.0)
+        if gains is not None:
+            self.body.gains = gains
+        self.time.carry(Emulator(self.body, robot, 0.0, scenario(faults), latency))
+        self.time.sleep(3.0)
+        self.person = Person(self.body, lambda: self.time.sleep(0.3))
+
+    def connect(self):
+        arguments = (lambda: VirtualPort(self.time), self.time.clock, self.time.sleep)
+        return WifiLine(*arguments) if self.wifi else SerialLine(Link(*arguments))
+
+    def calibrate(self, output, *steps):
+        try:
+            return accomplish(
+                steps or tuple(STEPS),
+                output,
+                self.connect,
+                self.person,
+                self.time.clock,
+                self.time.sleep,
+            )
+        finally:
+            self.time.sleep(0.1)
+
+
+def changed_robot(folder, radius, track):
+    """The planar robot with other wheels, in its arena."""
+    text = (MODELS / "epuck_planar.xml").read_text()
+    for gear in (f"{1 / WHEEL_RADIUS:.7f}", f"{TRACK / 2 / WHEEL_RADIUS:.7f}"):
+        assert text.count(gear) == 2
+    text = text.replace(f"{1 / WHEEL_RADIUS:.7f}", str(1 / radius))
+    text = text.replace(f"{TRACK / 2 / WHEEL_RADIUS:.7f}", str(track / 2 / radius))
+    path = folder / "other.xml"
+    path.write_text(text)
+    return load_scene(str(path), "arena")
+
+
+@pytest.fixture(scope="module")
+def planar():
+    return load_scene("epuck_planar", "arena")
+
+
+@pytest.fixture
+def output(tmp_path):
+    return tmp_path / "robot.yaml"
+
+
+@pytest.mark.parametrize(
+    ("robot", "latency"),
+    [("asercom", 0.0), ("btcom", 0.03), ("epuck2", 0.01), ("wifi", 0.0)],
+)
+def test_another_robot(tmp_path, output, robot, latency, capsys):
+    scene = changed_robot(tmp_path, 0.0201, 0.0562)
+    world = World(scene, GAINS, robot=robot, latency=latency)
+    world.body.offset, world.body.noise = 60, 1.0
+    assert world.calibrate(output) == 0
+    found = Calibration.load(output)
+    assert found.wheel_radius == pytest.approx(0.0201, rel=0.002)
+    assert found.track == pytest.approx(0.0562, rel=0.002)
+    np.testing.assert_allclose(found.gains, GAINS, rtol=0.02)
+    assert world.body.standing
+    out = capsys.readouterr().out
+    assert "wheel radius 20.10 mm; before 20.50" in out
+    assert "warning" not in out
+    assert out.count(f"written: {output}") == 3
+
+
+def test_a_robot_on_wheels(output):
+    """Its tyres creep: the radius on which it rolls is a little less."""
+    world = World(load_scene("epuck", "arena"), GAINS)
+    assert world.calibrate(output) == 0
+    found = Calibration.load(output)
+    assert found.wheel_radius == pytest.approx(WHEEL_RADIUS, rel=0.01)
+    assert found.track == pytest.approx(TRACK, rel=0.01)
+    np.testing.assert_allclose(found.gains, GAINS, rtol=0.03)
+
+
+def test_a_weak_sensor_is_no_reason_to_stop(planar, output, capsys):
+    world = World(planar)
+    moved = iter([0.02, 0.02, 0.02])
+    world.person.changes = {
+        "mm of air": [lambda: world.person.at_wall(next(moved))] * 3
+    }
+    assert world.calibrate(output, "sensors") == 0
+    assert capsys.readouterr().out.count("warning: ps") == N_PROXIMITY
+
+
+def test_one_step_keeps_what_the_others_found(planar, output):
+    before = Calibration(tuple(GAINS.tolist()), 0.0203, 0.0555)
+    before.save(output)
+    assert World(planar).calibrate(output, "turn") == 0
+    found = Calibration.load(output)
+    assert found.track == pytest.approx(TRACK * 0.0203 / WHEEL_RADIUS, rel=0.002)
+    assert dataclasses.replace(found, track=0.0555) == before
+
+
+# answers
+
+
+def test_bad_answers_are_asked_again(planar, output, capsys):
+    world = World(planar)
+    bad = ["", "half a metre", "51.5", "nan", "-0.5"]
+    world.person.changes = {"metres": [lambda: bad.pop(0)] * len(bad)}
+    assert world.calibrate(output, "straight") == 0
+    out = capsys.readouterr().out
+    assert "expected a number from 0.05 to 2, got '51.5'" in out
+    assert out.count("expected a number") == 5
+    world.person.changes = {"[y/n]": [lambda: "perhaps"]}
+    assert world.calibrate(output, "sensors") == 0
+    assert "expected y or n, got 'perhaps'" in capsys.readouterr().out
+
+
+def test_a_comma_for_a_point(planar, output):
+    world = World(planar)
+    world.person.changes = {"metres": [lambda: "0,515"]}
+    assert world.calibrate(output, "straight") == 0
+    found = Calibration.load(output)
+    assert found.wheel_radius == pytest.approx(WHEEL_RADIUS, rel=0.002)
+
+
+@pytest.mark.parametrize(
+    ("steps", "part", "answer", "message"),
+    [
+        (("straight",), "metres", "1.5", "a wheel radius from 15 to 25 mm, measured"),
+        (("turn",), "above 0", "-300", "a track from 45 to 65 mm, measured 76.2 mm"),
+        (("sensors",), "[y/n]", "n", "got 60 of ps0: the zero is not set"),
+    ],
+)
+def test_what_no_robot_has_is_refused(planar, output, steps, part, answer, message):
+    Calibration(track=0.055, wheel_radius=0.0204).save(output)
+    before = output.read_bytes()
+    world = World(planar)
+    world.body.offset = 60
+    world.person.changes = {part: [lambda: answer]}
+    with pytest.raises(UserError, match=message) as caught:
+        world.calibrate(output, *steps)
+    assert "\n" not in str(caught.value)
+    assert output.read_bytes() == before
+    assert world.body.standing
+
+
+def end_of_input():
+    raise EOFError
+
+
+@pytest.mark.parametrize("part", ["m clear before", "metres", "[y/n]", "mm of air"])
+def test_the_end_of_the_input(planar, output, part):
+    world = World(planar)
+    world.person.changes = {part: [end_of_input]}
+    with pytest.raises(UserError, match="got the end of the input") as caught:
+        world.calibrate(output)
+    assert "\n" not in str(caught.value)
+    assert world.body.standing
+    # steps that were done are not lost
+    assert output.exists() == (part in ("[y/n]", "mm of air"))
+
+
+# what goes wrong on the way
+
+
+@pytest.fixture
+def handlers():
+    before = {signum: signal.getsignal(signum) for signum in SIGNALS}
+    yield before
+    for signum, handler in before.items():
+        signal.signal(signum, handler)
+
+
+@pytest.mark.parametrize("step", list(STEPS))
+@pytest.mark.parametrize(
+    ("faults", "status", "message"),
+    [
+        ("stall@4", 3, "expected a reading every 300 ms"),
+        ("reset@4", 3, "WELCOME"),
+        ("disconnect@4", 3, "expected a robot at 'virtual'"),
+        ("gone@4", 4, "THE MOTORS MAY STILL TURN, switch the robot off"),
+    ],
+)
+def test_faults(planar, output, capsys, step, faults, status, message):
+    world = World(planar, faults=faults)
+    world.person.changes = {"[y/n]": [lambda: "n"]}
+    assert world.calibrate(output, step) == status
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert world.body.standing == (status != 4)
+    assert not output.exists()
+
+
+def test_a_robot_that_stalls_its_motors(planar, output, capsys, monkeypatch):
+    world = World(planar)
+    monkeypatch.setattr(world.body, "steps", lambda: (0, 0))
+    assert world.calibrate(output, "straight") == 3
+    assert "expected 4000 steps in 32 s; came 0" in capsys.readouterr().err
+    assert world.body.standing
+
+
+def test_a_signal_while_it_drives(planar, output, capsys, handlers, monkeypatch):
+    world = World(planar)
+    sleep = world.time.sleep
+
+    def interrupted(duration):
+        if not world.body.standing:
+            signal.raise_signal(signal.SIGINT)
+        sleep(duration)
+
+    monkeypatch.setattr(world.time, "sleep", interrupted)
+    assert world.calibrate(output) == 130
+    assert world.body.standing
+    assert capsys.readouterr().err == "SIGINT: ended, the robot stands still\n"
+    assert not output.exists()
+
+
+def test_a_signal_at_a_question(planar, output, handlers):
+    world = World(planar)
+    world.person.changes = {"metres": [lambda: signal.raise_signal(signal.SIGTERM)]}
+    assert world.calibrate(output) == 128 + signal.SIGTERM
+
+
+# the command line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "expected --port"),
+        (["--port", "/dev/nope"], "no port '/dev/nope'; available"),
+        (["--port", "/dev/null"], "is not a serial port"),
+        (["--port", "x", "--only", "arms"], "arms"),
+        (["--port", "x", "--output", "."], "cannot write '.': it is a folder"),
+        (["--port", "x", "--output", "no/robot.yaml"], "no folder 'no'"),
+        (["--port", "x", "--output", "hello.yaml"], "is not a calibration"),
+        (["--port", "x", "--nonsense"], "nonsense"),
+    ],
+)
+def test_bad_input(arguments, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "hello.yaml").write_text("hello: 1")
+    with pytest.raises(UserError, match=message) as caught:
+        calibrate(arguments, lambda _: "")
+    assert "\n" not in str(caught.value)
+    assert [path.name for path in tmp_path.iterdir()] == ["hello.yaml"]
+
+
+SPEED = 2.25
+"""Of the emulated robot's time: a whole calibration in half a minute."""
+
+
+def clock():
+    return SPEED * time.monotonic()
+
+
+@contextmanager
+def own_robot(endpoint, scene):
+    """A robot of its own behind an endpoint, faster than real, in a thread of ours."""
+    body = Body(scene, np.zeros(3), clock())
+    body.gains, body.offset = GAINS, 40
+    emulator = Emulator(body, "asercom", clock())
+    end = threading.Event()
+    arguments = (emulator, endpoint, clock, lambda: not end.is_set())
+    thread = threading.Thread(target=serve, args=arguments)
+    thread.start()
+    try:
+        yield body
+    finally:
+        end.set()
+        thread.join(PATIENCE)
+        assert not thread.is_alive()
+
+
+@contextmanager
+def started(port, *arguments, stdin=subprocess.PIPE):
+    """A calibration that is under way; killed if it hangs."""
+    process = subprocess.Popen(
+        [
+            *(sys.executable, "-W", "error", "-m", "epuck_mj.calibrate"),
+            *("--port", str(port), *arguments),
+        ],
+        stdin=stdin,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.communicate(timeout=PATIENCE)
+
+
+def answered(process, person):
+    """What a calibration says, answered until it ends."""
+    said = question = ""
+    while data := os.read(process.stdout.fileno(), 1000).decode():
+        said, question = said + data, question + data
+        if question.endswith(": "):
+            process.stdin.write(f"{person(question)}\n")
+            process.stdin.flush()
+            question = ""
+    return said
+
+
+@pytest.mark.slow
+def test_the_whole_command(tmp_path, output):
+    scene = changed_robot(tmp_path, 0.0201, 0.0562)
+    port = Pty(tmp_path / "e-puck")
+    with own_robot(port, scene) as body:
+        # a machine so busy that the watchdog saw it gets more chances
+        for chance in (3, 2, 1):
+            person = Person(body, lambda: time.sleep(0.1))
+            with started(port.name, "--output", str(output)) as process:
+                said = answered(process, person)
+                _, error = process.communicate(timeout=PATIENCE)
+            assert body.standing
+            if BUSY not in error or chance == 1:
+                assert (process.returncode, error) == (0, "")
+                assert "residual" in said
+                break
+    found = Calibration.load(output)
+    assert found.wheel_radius == pytest.approx(0.0201, rel=0.01)
+    assert found.track == pytest.approx(0.0562, rel=0.01)
+    np.testing.assert_allclose(found.gains, GAINS, rtol=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
+def test_signals(planar, tmp_path, output, signum):
+    port = Pty(tmp_path / "e-puck")
+    with (
+        living(port, planar) as emulator,
+        started(port.name, "--output", str(output)) as process,
+    ):
+        assert process.stdin is not None
+        process.stdin.write("\n")
+        process.stdin.flush()
+        wait_for(lambda: not emulator.body.standing, "drove")
+        process.send_signal(signum)
+        _, error = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 128 + signum
+        assert emulator.body.standing
+    assert error == f"{signum.name}: ended, the robot stands still\n"
+    assert not output.exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGHUP])
+def test_signals_at_a_terminals_question(tmp_path, output, signum):
+    master, slave = pty.openpty()
+    try:
+        with started("unused", "--output", str(output), stdin=slave) as process:
+            assert process.stdout is not None
+            while not process.stdout.readline().startswith("Mark where"):
+                pass
+            time.sleep(0.3)
+            process.send_signal(signum)
+            _, error = process.communicate(timeout=PATIENCE)
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert process.returncode == 128 + signum
+    assert error.startswith(f"{signum.name}: ended")
+
+
+@pytest.mark.slow
+def test_nobody_answers(planar, tmp_path, output):
+    port = Pty(tmp_path / "e-puck")
+    with (
+        living(port, planar),
+        started(port.name, "--output", str(output)) as process,
+    ):
+        _, error = process.communicate("", timeout=PATIENCE)
+    assert process.returncode == 2
+    assert error == (
+        "error: expected an answer to 'Then press Enter', got the end of the input\n"
+    )
+
+
+# what the file is for
+
+
+def test_a_calibrated_robot_in_simulation(tmp_path, planar):
+    """It drives as the robot does whose wheels these really are."""
+    calibration = Calibration(tuple(GAINS), 0.0201, 0.0562)
+    quiet = Noise(counts=0.0, wheels=0.0, age=0.0)
+    rng = np.random.default_rng(0)
+    disturbances = calibrated(calibration, rng, 2, 20, quiet)
+    robots = DisturbedRobots(SimulatedRobots(planar, 2, 1), disturbances, 0.1)
+    other = SimulatedRobots(changed_robot(tmp_path, 0.0201, 0.0562), 2, 1)
+    starts = np.array([[0.3, 0.0, 1.0], [0.44, 0.1, 1.5]])
+    reading, truth = robots.reset(starts), other.reset(starts)
+    command = np.tile(np.array([200, 250]) * STEP_ANGLE, (2, 1))
+    for _ in range(20):
+        reading, truth = robots.step(command), other.step(command)
+    np.testing.assert_allclose(robots.poses(), other.poses(), atol=1e-3)
+    assert reading.truth is not None
+    expected = np.rint(proximity(reading.truth, GAINS))
+    np.testing.assert_array_equal(reading.proximity, expected)
+    assert truth.distance.shape == (2, 8)
