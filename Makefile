@@ -41,8 +41,8 @@ bridge: $(INSTALLED)
 
 # champions of the studies in pseudo-realities
 gap: $(INSTALLED)
-	$(BIN)/python -m evolution.gap results/paper results/transfer wall-follower \
-	  --output results/gap
+	$(BIN)/python -m evolution.gap results/paper wall-follower \
+	  --robot epuck_planar --output results/gap
 
 # what git keeps of the studies in runs/, and everything that is made of it
 results: $(INSTALLED)

@@ -13,7 +13,6 @@ from epuck_mj.constants import TRACK, WHEEL_RADIUS
 from epuck_mj.control import TaskParameters
 from epuck_mj.errors import UserError
 from epuck_mj.wall_follower import WallFollower
-from evolution.gap import command
 from evolution.gap import worlds as gap_worlds
 from evolution.gap.command import gap
 from evolution.gap.document import document
@@ -162,7 +161,7 @@ def test_rank_correlations_of_hand_made_worlds():
 def test_the_document_says_who_kept_what():
     names = ["a/seed-1", "a/seed-2", "b"]
     groups = {"a": [0, 1], "b": [2]}
-    text = to_markdown(document(names, {"epuck": TRANSFER}, groups, 5, 7))
+    text = to_markdown(document(names, {"epuck": TRANSFER}, groups, 5))
     assert "3 policies, frozen, in 4 worlds" in text
     assert "| a | a/seed-1 | 0.500 |" in text
     assert "50% [15%, 85%]" in text
@@ -171,8 +170,7 @@ def test_the_document_says_who_kept_what():
     assert "Rank correlation" in text
 
 
-def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(command, "HOME_STARTS", 5)
+def test_the_command_writes_what_it_measured(tmp_path, capsys):
     output = tmp_path / "new" / "gap"
     arguments = ["wall-follower", str(CHAMPION), "--output", str(output)]
     small = ["--worlds", "3", "--starts", "2", "--robot", "epuck_planar"]

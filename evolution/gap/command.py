@@ -29,8 +29,6 @@ from evolution.results import PLANAR_ROBOT, WHEELED_ROBOT
 
 MODULE = "evolution.gap"
 WORLDS_MAX, STARTS_MAX = 1000, 1000
-HOME_STARTS = 100
-"""Test starts at home: what everything is divided by."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,7 @@ class Options:
         paths: run or study directories, controller files, or wall-follower.
         output: folder to write gap.md, gap.json, gap.csv and figures into.
         worlds: how many.
-        starts: test starts in each world.
+        starts: test starts in each world, and at home.
         robot: robot that drives; both shipped ones if not given.
         threads: threads that step the robots; 0 is one per core. Changes no result.
     """
@@ -49,7 +47,7 @@ class Options:
     paths: tyro.conf.Positional[tuple[str, ...]]
     output: Path
     worlds: int = 100
-    starts: int = 10
+    starts: int = 20
     robot: str | None = None
     threads: int = 0
 
@@ -93,7 +91,7 @@ def _measured(
     robot: str,
     options: Options,
 ) -> Measured:
-    home = at_home(policies, robot, HOME_STARTS, options.threads)
+    home = at_home(policies, robot, options.starts, options.threads)
     outcomes = abroad(policies, places, robot, options.starts, options.threads)
     bar = tqdm(
         outcomes,
@@ -117,7 +115,6 @@ def _write(
     record = {
         "worlds": [asdict(world) for world in places],
         "starts": options.starts,
-        "home_starts": HOME_STARTS,
         "robots": {
             robot: {
                 policy.name: {
@@ -133,7 +130,7 @@ def _write(
         write_text(folder / "gap.json", json.dumps(record, indent=1) + "\n")
         write_text(folder / "gap.csv", _rows(policies, places, transfers))
         names = [policy.name for policy in policies]
-        blocks = document(names, transfers, groups, options.starts, HOME_STARTS)
+        blocks = document(names, transfers, groups, options.starts)
         write_text(folder / "gap.md", to_markdown(blocks))
         table = to_markdown([summary(transfers, groups)])
         write_text(folder / "summary.md", table)

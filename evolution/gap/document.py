@@ -68,7 +68,6 @@ def document(
     transfers: Mapping[str, Transfer],
     groups: Mapping[str, Sequence[int]],
     starts: int,
-    home_starts: int,
 ) -> list[Block]:
     """What was found.
 
@@ -76,16 +75,15 @@ def document(
         names: of the policies.
         transfers: by robot, at least one.
         groups: indices of the policies of each experiment.
-        starts: of each world.
-        home_starts: at home.
+        starts: of each world, and at home.
     """
     n_worlds = len(next(iter(transfers.values())).fitness)
     blocks: list[Block] = [
         Heading("The reality gap", 1),
         Paragraph(
             f"{len(names)} policies, frozen, in {n_worlds} worlds of a Latin "
-            f"hypercube, {starts} test starts each. Home: the arena they evolved in, "
-            f"ideal sensors and motors, {home_starts} test starts. A world is mastered "
+            f"hypercube, on the first {starts} test starts. Home: the arena they "
+            "evolved in, ideal sensors and motors, as many starts. A world is mastered "
             f"with at least {SHARE_KEPT:.0%} of the fitness at home and fewer than "
             f"{COLLISIONS_MAX:g} collision per minute. In brackets, 95 % intervals "
             "over the worlds."
