@@ -13,6 +13,21 @@ from epuck_mj.sensors import Reading, counted, sensed_distance
 from epuck_mj.simulation import SimulatedRobots
 
 
+def disturbed(
+    robots: SimulatedRobots, disturbances: Disturbances | None, control_step: float
+) -> "SimulatedRobots | DisturbedRobots":
+    """Robots with disturbances around them, or as they are if there are none.
+
+    Args:
+        robots: that drive.
+        disturbances: of each of them.
+        control_step: its duration [s].
+    """
+    if disturbances is None:
+        return robots
+    return DisturbedRobots(robots, disturbances, control_step)
+
+
 class DisturbedRobots:
     """Robots in disturbances; steps like `SimulatedRobots`."""
 

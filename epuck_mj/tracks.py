@@ -9,7 +9,7 @@ import numpy as np
 
 from epuck_mj.control import BatchPolicy, TaskParameters, control_step
 from epuck_mj.disturbances import Disturbances
-from epuck_mj.disturbed_robots import DisturbedRobots
+from epuck_mj.disturbed_robots import DisturbedRobots, disturbed
 from epuck_mj.sensors import observe
 from epuck_mj.simulation import SimulatedRobots
 
@@ -87,9 +87,8 @@ def record_tracks(
     )
     group = np.arange(n) // robots.capacity
     for members in (group == i for i in range(group.max(initial=-1) + 1)):
-        mine = robots
-        if disturbances is not None:
-            mine = DisturbedRobots(robots, disturbances[members], task.control_step)
+        met = None if disturbances is None else disturbances[members]
+        mine = disturbed(robots, met, task.control_step)
         _record(mine, policy[members], starts, task, tracks, np.flatnonzero(members))
     return tracks
 

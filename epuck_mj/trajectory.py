@@ -152,9 +152,6 @@ def record(
             break
     distance = np.concatenate([reading.distance for reading in readings])
     seen = np.concatenate(observations)
-    # bit for bit what was inside the policy: it acts the same alone and in a crowd
-    network = isinstance(policy, Controller)
-    hidden = policy.activation(seen[:-1]) if network else np.zeros((len(steps), 0))
     return Trajectory(
         time=np.arange(len(poses)) * task.control_step,
         pose=np.concatenate(poses),
@@ -162,8 +159,21 @@ def record(
         proximity=np.rint(proximity(distance)),
         observation=seen,
         contact=np.concatenate([reading.contact for reading in readings]),
-        hidden=hidden,
+        hidden=hidden_outputs(policy, seen[:-1]),
         action=np.concatenate([step.action for step in steps]),
         command=np.concatenate([step.command for step in steps]),
         fitness=np.concatenate([step.fitness for step in steps]),
     )
+
+
+def hidden_outputs(policy: Policy, observations: np.ndarray) -> np.ndarray:
+    """What was inside a policy, `(T, hidden)`: of one without a network, `(T, 0)`.
+
+    Args:
+        policy: that saw the observations, one after the other.
+        observations: `(T, 8)`.
+    """
+    if isinstance(policy, Controller):
+        # bit for bit: it acts the same alone and in a crowd
+        return policy.activation(observations)
+    return np.zeros((len(observations), 0))

@@ -14,10 +14,10 @@ from typing import Protocol
 
 import numpy as np
 
-from epuck_mj.control import Robots, TaskParameters, Trials, run_trials
+from epuck_mj.control import TaskParameters, Trials, run_trials
 from epuck_mj.controller import Controller, Network
 from epuck_mj.disturbances import Disturbances
-from epuck_mj.disturbed_robots import DisturbedRobots
+from epuck_mj.disturbed_robots import disturbed
 from epuck_mj.model import Scene
 from epuck_mj.simulation import SimulatedRobots
 from epuck_mj.tasks import FollowWalls, environment
@@ -118,7 +118,11 @@ class BatchEngine:
             trials, race = 1, None
         parts = [
             run_trials(
-                self._in(None if disturbances is None else disturbances[chunk]),
+                disturbed(
+                    self._robots,
+                    None if disturbances is None else disturbances[chunk],
+                    self._task.control_step,
+                ),
                 controller[chunk],
                 starts[chunk],
                 self._task,
@@ -127,12 +131,6 @@ class BatchEngine:
             for chunk in chunks(len(starts), trials, self._robots.capacity)
         ]
         return joined(parts)
-
-    def _in(self, disturbances: Disturbances | None) -> Robots:
-        """The robots, with those around them."""
-        if disturbances is None:
-            return self._robots
-        return DisturbedRobots(self._robots, disturbances, self._task.control_step)
 
 
 class DmControlEngine:

@@ -2,6 +2,7 @@
 
 import os
 import signal
+from pathlib import Path
 
 # rerun: no analytics, and warnings about bad data are errors
 os.environ["CI"] = "1"
@@ -15,6 +16,27 @@ from epuck_mj.model import Scene, load_scene
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROBOTS = ("epuck", "epuck_planar")
+
+
+@pytest.fixture
+def alone(tmp_path, monkeypatch):
+    """A working directory of its own on a machine without display or network."""
+    for name in list(os.environ):
+        if name in ("DISPLAY", "WAYLAND_DISPLAY", "RERUN") or name.startswith("XDG_"):
+            monkeypatch.delenv(name)
+    for name, value in {
+        "CI": "1",
+        "RERUN_STRICT": "1",
+        "RUST_LOG": "error",
+        "HOME": str(tmp_path),
+        "XDG_RUNTIME_DIR": str(tmp_path),
+        "HTTPS_PROXY": "http://127.0.0.1:9",
+        "NO_PROXY": "127.0.0.1,localhost",
+        "PYTHONPATH": str(Path(__file__).parent.parent),
+    }.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
 @pytest.fixture(scope="session", params=ROBOTS)

@@ -75,6 +75,20 @@ def test_a_reply():
 
 
 @pytest.mark.parametrize(
+    "request_", [binary.speeds(), ascii.speeds()], ids=["binary", "ascii"]
+)
+@pytest.mark.parametrize("cut", [1, 20, len(BANNER) - 3])
+def test_a_banner_in_two_halves_is_a_banner(request_, cut):
+    """The first half comes for a reply, the other one while host and robot meet."""
+    link, script = linked((0.0, BANNER[:cut]), (0.0, BARRIER))
+    with pytest.raises(BridgeError):
+        link.ask(request_)
+    script.due.append((script.now, BANNER[cut:]))
+    assert link.resync(script.now + 5)
+    assert link.in_step
+
+
+@pytest.mark.parametrize(
     ("state", "text"), [("1", "good"), ("0", "low"), ("3210 (87%)", "3210 (87%)")]
 )
 def test_battery(state, text):

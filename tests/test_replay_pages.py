@@ -1,7 +1,6 @@
 """Replays as people see them: rerun's viewer without a window, and the web page."""
 
 import io
-import os
 import re
 import signal
 import subprocess
@@ -28,24 +27,8 @@ PATIENCE = 120
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
-    """A working directory on a machine that is alone."""
-    for name in list(os.environ):
-        if name in ("DISPLAY", "WAYLAND_DISPLAY", "RERUN") or name.startswith("XDG_"):
-            monkeypatch.delenv(name)
-    for name, value in {
-        "CI": "1",
-        "RERUN_STRICT": "1",
-        "RUST_LOG": "error",
-        "HOME": str(tmp_path),
-        "XDG_RUNTIME_DIR": str(tmp_path),
-        "HTTPS_PROXY": "http://127.0.0.1:9",
-        "NO_PROXY": "127.0.0.1,localhost",
-        "PYTHONPATH": str(ROOT),
-    }.items():
-        monkeypatch.setenv(name, value)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+def here(alone):
+    return alone
 
 
 @contextmanager

@@ -43,31 +43,16 @@ needs_proc = pytest.mark.skipif(
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
-    """A working directory with a champion, on a machine that is alone."""
-    for name in list(os.environ):
-        if name in ("DISPLAY", "WAYLAND_DISPLAY", "RERUN") or name.startswith("XDG_"):
-            monkeypatch.delenv(name)
-    for name, value in {
-        "CI": "1",
-        "RERUN_STRICT": "1",
-        "RUST_LOG": "error",
-        "HOME": str(tmp_path),
-        "XDG_RUNTIME_DIR": str(tmp_path),
-        "HTTPS_PROXY": "http://127.0.0.1:9",
-        "NO_PROXY": "127.0.0.1,localhost",
-        "PYTHONPATH": str(ROOT),
-        "MUJOCO_GL": "disabled",
-    }.items():
-        monkeypatch.setenv(name, value)
+def here(alone, monkeypatch):
+    """A champion in a working directory, without OpenGL."""
+    monkeypatch.setenv("MUJOCO_GL", "disabled")
     monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
-    monkeypatch.chdir(tmp_path)
     genome = np.random.default_rng(0).uniform(-5, 5, Network().n_genes)
     scene = {"robot": "epuck_planar", "arena": "arena"}
     task = asdict(TaskParameters(steps=8))
     file = ControllerFile(Network(), genome, task, scene, {})
-    (tmp_path / "champion.json").write_text(file.to_json())
-    return tmp_path
+    (alone / "champion.json").write_text(file.to_json())
+    return alone
 
 
 PATIENT = """

@@ -179,7 +179,8 @@ class Link:
         """
         binary = request.out.endswith(b"\0")
         stale = self._rest + self._receive(0.0)
-        self._rest = b""
+        # half a banner may be in what is of no use here: `resync` looks at it again
+        self._rest = stale
         if not self.in_step:
             raise BridgeError("host and robot in step", stale or "an open question")
         # until the reply is here, whatever happens, a signal included
@@ -188,23 +189,24 @@ class Link:
             raise RobotRestarted(f"silence before {request.name}", stale)
         if stale and binary:
             raise BridgeError(f"silence before {request.name}", stale)
-        parser, came = request.parser(), b""
+        self._rest = b""
+        parser = request.parser()
         deadline = min(self.clock() + request.patience, until)
         self._send(request.out)
         while (now := self.clock()) < deadline:
             data = self._receive(deadline - now)
             if not data:
                 continue
+            self._rest += data
             reply = parser.feed(data)
             if reply is not None:
                 self._rest = parser.rest
                 self.in_step = True
                 return reply
-            came += data
             if binary:
                 # bytes come without a pause: the rest of them was lost
                 deadline = min(self.clock() + RESYNC.quiet, until)
-        raise NoReply(f"a reply to {request.name} in time", came or "nothing")
+        raise NoReply(f"a reply to {request.name} in time", self._rest or "nothing")
 
     def resync(self, until: float) -> bool:
         """Find each other again; what the robot had heard of has been carried out.

@@ -10,10 +10,9 @@ import numpy as np
 
 from epuck_mj.bridge.robot import Moment, RealRobot
 from epuck_mj.control import ControlStep, Policy, TaskParameters, control_step
-from epuck_mj.controller import Controller
 from epuck_mj.motors import STEP_ANGLE
 from epuck_mj.sensors import Reading, observe
-from epuck_mj.trajectory import Trajectory
+from epuck_mj.trajectory import Trajectory, hidden_outputs
 
 
 @dataclass(frozen=True)
@@ -91,8 +90,6 @@ class Session:
         distance = np.array([reading.distance for reading in readings])
         seen = observe(distance, self.task.sensor_range)
         n_steps = len(self.steps)
-        network = isinstance(policy, Controller)
-        hidden = policy.activation(seen[:-1]) if network else np.zeros((n_steps, 0))
         controls = [step.control for step in self.steps]
         return Trajectory(
             time=np.array([moment.time for moment in moments]) - self.start.time,
@@ -101,7 +98,7 @@ class Session:
             proximity=np.array([moment.proximity for moment in moments]),
             observation=seen,
             contact=np.zeros(n_steps + 1, bool),
-            hidden=hidden,
+            hidden=hidden_outputs(policy, seen[:-1]),
             action=_rows([control.action for control in controls]),
             command=_rows([step.moment.rates * STEP_ANGLE for step in self.steps]),
             fitness=np.array([control.fitness for control in controls], float),

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.simulation import SimulatedRobots
@@ -32,11 +33,13 @@ def at_home(
     policies: Sequence[NamedPolicy], robot: str, n: int, threads: int
 ) -> list[Outcome]:
     """Each policy in the arena it evolved in, on an ideal robot, on `n` test starts."""
+    scenes = cache(lambda arena, step: load_scene(robot, arena, step))
+    free = cache(FreeSpace)
     outcomes = []
     for policy in policies:
-        scene = load_scene(robot, policy.arena, policy.task.control_step)
+        scene = scenes(policy.arena, policy.task.control_step)
         robots = SimulatedRobots(scene, n, threads)
-        starts = starts_for_test(FreeSpace(scene, policy.start_clearance), n)
+        starts = starts_for_test(free(scene, policy.start_clearance), n)
         everybody = Everybody(policy.policy)
         tracks = record_tracks(robots, everybody, starts, policy.task)
         outcomes.append(_outcome(tracks, policy.task.control_step))
@@ -57,12 +60,14 @@ def abroad(
     for index, world in enumerate(worlds):
         scene, period = _scene(world, robot)
         robots = SimulatedRobots(scene, n, threads)
+        # the same for most policies, and slow
+        free = cache(FreeSpace)
         outcomes = []
         for policy in policies:
             duration = policy.task.steps * policy.task.control_step
             steps = round(duration / period)
             task = replace(policy.task, steps=steps, control_step=period)
-            starts = starts_for_test(FreeSpace(scene, policy.start_clearance), n)
+            starts = starts_for_test(free(scene, policy.start_clearance), n)
             tracks = record_tracks(
                 robots,
                 Everybody(policy.policy),
