@@ -6,12 +6,12 @@ Made by `python -m epuck_mj.calibrate`, read by simulation and bridge alike.
 import math
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import yaml
 
-from epuck_mj.constants import N_PROXIMITY, TRACK, WHEEL_RADIUS
+from epuck_mj.constants import N_PROXIMITY, N_WHEELS, TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.files import write_text, writing
 
@@ -22,31 +22,34 @@ class Calibration:
 
     Attributes:
         proximity_gains: counts of each sensor against the mean sensor's.
-        wheel_radius: on which the robot rolls [m].
+        wheel_radii: on which the robot rolls, left and right [m].
         track: effective distance of the wheels [m].
     """
 
     proximity_gains: tuple[float, ...] = (1.0,) * N_PROXIMITY
-    wheel_radius: float = WHEEL_RADIUS
+    wheel_radii: tuple[float, ...] = (WHEEL_RADIUS,) * N_WHEELS
     track: float = TRACK
 
     def __post_init__(self) -> None:
         """Refuse what no robot has."""
-        numbers = (*self.proximity_gains, self.wheel_radius, self.track)
-        real = (int, float)
-        if len(self.proximity_gains) != N_PROXIMITY or not all(
-            isinstance(number, real) and math.isfinite(number) and number > 0
-            for number in numbers
-        ):
-            raise ValueError(
-                f"expected {N_PROXIMITY} gains, a wheel radius and a track, all above "
-                f"0, got {numbers}"
-            )
+        for name, size in (("proximity_gains", N_PROXIMITY), ("wheel_radii", N_WHEELS)):
+            numbers = getattr(self, name)
+            if not (isinstance(numbers, tuple) and len(numbers) == size):
+                raise ValueError(f"expected {size} {name}, got {numbers!r}")
+        for number in (*self.proximity_gains, *self.wheel_radii, self.track):
+            real = isinstance(number, int | float) and math.isfinite(number)
+            if not (real and number > 0):
+                raise ValueError(f"expected numbers above 0, got {number!r}")
 
     @property
     def gains(self) -> np.ndarray:
         """Of the proximity sensors, `(8,)`."""
         return np.array(self.proximity_gains)
+
+    @property
+    def wheel_radius(self) -> float:
+        """Mean of both wheels [m]."""
+        return sum(self.wheel_radii) / N_WHEELS
 
     def save(self, path: Path) -> None:
         """Write YAML.
@@ -57,7 +60,7 @@ class Calibration:
         # plain floats: YAML knows no numpy
         content = {
             "proximity_gains": [float(gain) for gain in self.proximity_gains],
-            "wheel_radius": float(self.wheel_radius),
+            "wheel_radii": [float(radius) for radius in self.wheel_radii],
             "track": float(self.track),
         }
         with writing(path.parent):
@@ -72,15 +75,29 @@ class Calibration:
         """
         try:
             content = yaml.safe_load(path.read_text(encoding="utf-8"))
-            if not isinstance(content, dict):
-                raise ValueError("expected keys and values")
-            gains = content.get("proximity_gains", (1.0,) * N_PROXIMITY)
-            return cls(**{**content, "proximity_gains": tuple(gains)})
+            return cls.from_dict(content)
         except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
             reason = " ".join(str(error).split())
             raise UserError(f"cannot read calibration '{path}': {reason}") from None
-        except (TypeError, ValueError) as error:
-            keys = ", ".join(field.name for field in fields(cls))
-            raise UserError(
-                f"'{path}' is not a calibration: {error}; keys: {keys}"
-            ) from None
+        except ValueError as error:
+            raise UserError(f"'{path}' is not a calibration: {error}") from None
+
+    @classmethod
+    def from_dict(cls, content: Any) -> Self:
+        """What keys and values say; those missing are the books'.
+
+        Raises:
+            ValueError: if they are no calibration's.
+        """
+        keys = [field.name for field in fields(cls)]
+        if not isinstance(content, dict):
+            raise ValueError(f"expected keys of {', '.join(keys)}")
+        if unknown := [str(key) for key in content if key not in keys]:
+            raise ValueError(
+                f"unknown {', '.join(unknown)}; available: {', '.join(keys)}"
+            )
+        lists_as_tuples: dict[str, Any] = {
+            key: tuple(value) if isinstance(value, list) else value
+            for key, value in content.items()
+        }
+        return cls(**lists_as_tuples)

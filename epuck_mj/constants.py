@@ -87,6 +87,9 @@ TURN_RATE_MAX = 2 * SPEED_MAX / TRACK
 N_PROXIMITY = 8
 """Number of infra-red proximity sensors. FIRMWARE, PAPER."""
 
+N_WHEELS = 2
+"""Left and right, in this order everywhere."""
+
 PROXIMITY_ANGLES = (-17.2, -49.9, -90.0, -148.1, 148.1, 90.0, 49.9, 17.2)
 """Directions of ps0..ps7 [degrees from forward, left positive]. PLAYER.
 

@@ -10,9 +10,13 @@ from typing import Self
 import numpy as np
 
 from epuck_mj.calibration import Calibration
-from epuck_mj.constants import N_PROXIMITY, PROXIMITY_PERIOD, TRACK, WHEEL_RADIUS
-
-N_WHEELS = 2
+from epuck_mj.constants import (
+    N_PROXIMITY,
+    N_WHEELS,
+    PROXIMITY_PERIOD,
+    TRACK,
+    WHEEL_RADIUS,
+)
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,7 @@ class Disturbances:
     Attributes:
         of: which of the `k` each trial meets, `(n,)`.
         gains: of the proximity sensors, `(k, 8)`.
+        known_gains: what those who read the sensors take for their gains, `(k, 8)`.
         age: of their readings at the end of a control step [s], `(k, 8)`.
         count_noise: of each reading, in published standard deviations,
             `(k, steps + 1, 8)`.
@@ -97,6 +102,7 @@ class Disturbances:
 
     of: np.ndarray
     gains: np.ndarray
+    known_gains: np.ndarray
     age: np.ndarray
     count_noise: np.ndarray
     wheel_gains: np.ndarray
@@ -111,6 +117,7 @@ class Disturbances:
         k, steps = self.wheel_noise.shape[:2]
         expected = {
             "gains": (k, N_PROXIMITY),
+            "known_gains": (k, N_PROXIMITY),
             "age": (k, N_PROXIMITY),
             "count_noise": (k, steps + 1, N_PROXIMITY),
             "wheel_gains": (k, N_WHEELS),
@@ -159,6 +166,7 @@ def draw(
         of=np.arange(n),
         # a sensor that is twice as strong is as likely as one half as strong
         gains=np.exp(rng.uniform(low, high, (n, N_PROXIMITY))),
+        known_gains=np.ones((n, N_PROXIMITY)),
         age=rng.uniform(0, noise.age, (n, N_PROXIMITY)),
         count_noise=noise.counts * rng.standard_normal((n, steps + 1, N_PROXIMITY)),
         wheel_gains=rng.uniform(*ranges.wheel_radius, (n, N_WHEELS)) / WHEEL_RADIUS,
@@ -179,6 +187,8 @@ def calibrated(
 ) -> Disturbances:
     """Disturbances of `n` trials of one robot, of which we know in what it differs.
 
+    As on the bridge, its sensors' gains are undone, and its wheels' are not.
+
     Args:
         calibration: of that robot.
         rng: where its noise comes from.
@@ -186,9 +196,12 @@ def calibrated(
         steps: control steps of a trial.
         noise: how strong.
     """
+    gains = np.tile(calibration.gains, (n, 1))
+    wheels = np.array(calibration.wheel_radii) / WHEEL_RADIUS
     return replace(
         draw(rng, n, steps, noise),
-        gains=np.tile(calibration.gains, (n, 1)),
-        wheel_gains=np.full((n, N_WHEELS), calibration.wheel_radius / WHEEL_RADIUS),
+        gains=gains,
+        known_gains=gains,
+        wheel_gains=np.tile(wheels, (n, 1)),
         turn_gain=np.full(n, TRACK / calibration.track),
     )

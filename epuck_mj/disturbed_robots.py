@@ -103,4 +103,5 @@ class DisturbedRobots:
         aged = truth + (before - truth) * self._share[of]
         aged = np.where((truth < 0) | (before < 0), truth, aged)
         counts = counted(aged, given.gains[of], given.count_noise[of, self._k])
-        return Reading(sensed_distance(counts), reading.contact, counts, truth)
+        distance = sensed_distance(counts, given.known_gains[of])
+        return Reading(distance, reading.contact, counts, truth)

@@ -88,7 +88,7 @@ def choose_champion(engine: Engine, experiment: Experiment) -> Champion:
     network = experiment.config.network
     # as it was evolved: robots that are disturbed alike
     config, key = experiment.config, (HELD_OUT_SEED, Purpose.VALIDATION)
-    met = disturbances(config.noise, config.randomise, config.steps, len(starts), *key)
+    met = disturbances(config.conditions, len(starts), config.steps, *key)
     fitness = evaluate(engine, network, genomes, starts, disturbances=met).fitness
     best = int(fitness.argmax())
     return Champion(genomes[best], float(stored[best]), float(fitness[best]))

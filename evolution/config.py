@@ -17,6 +17,7 @@ from pydantic import (
     model_validator,
 )
 
+from epuck_mj.calibration import Calibration
 from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
 from epuck_mj.control import TaskParameters
 from epuck_mj.controller import Network
@@ -24,6 +25,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.files import is_file
 from epuck_mj.motors import Speeds
 from epuck_mj.tasks import START_CLEARANCE
+from evolution.conditions import Conditions
 from evolution.optimizer import ALGORITHMS, OptimizerParameters, SearchSpace
 
 CONFIGS = Path(__file__).resolve().parent / "configs"
@@ -53,6 +55,20 @@ OptimizerConfig = Annotated[
     Field(discriminator="algorithm"),
     BeforeValidator(_of_known_algorithm),
 ]
+
+
+def _calibration(value: Any) -> Any:
+    """A calibration in the config itself, which is how one of a file is kept.
+
+    Raises:
+        UserError: if a file is named that is none.
+        ValueError: if it is anything else.
+    """
+    if value is None or isinstance(value, Calibration):
+        return value
+    if isinstance(value, str):
+        return Calibration.load(Path(value))
+    return Calibration.from_dict(value)
 
 
 NoiseLevel = Literal["none", "calibrated", "strong"]
@@ -93,6 +109,11 @@ class ExperimentConfig(BaseModel):
     randomise: StrictBool = Field(
         False, description="another robot in each trial; needs noise"
     )
+    calibration: Annotated[Calibration | None, BeforeValidator(_calibration)] = Field(
+        None,
+        description="file of python -m epuck_mj.calibrate, or its keys: that robot "
+        "in all trials; needs noise",
+    )
     start_clearance: StrictFloat = Field(
         START_CLEARANCE,
         gt=0,
@@ -112,11 +133,15 @@ class ExperimentConfig(BaseModel):
     optimizer: OptimizerConfig
 
     @model_validator(mode="after")
-    def _of_real_robots(self) -> Self:
-        """Only real robots differ from each other."""
-        if self.randomise and self.noise == "none":
-            raise ValueError("randomise needs noise: calibrated or strong, got none")
+    def _of_robots_there_are(self) -> Self:
+        """Refuse conditions that exclude themselves."""
+        _ = self.conditions
         return self
+
+    @property
+    def conditions(self) -> Conditions:
+        """What the robots are like."""
+        return Conditions(self.noise, self.randomise, self.calibration)
 
     @property
     def task(self) -> TaskParameters:

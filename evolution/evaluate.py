@@ -8,10 +8,12 @@ from pathlib import Path
 import tyro
 
 from epuck_mj import files
+from epuck_mj.calibration import Calibration
 from epuck_mj.command_line import check_threads, main, parse
 from epuck_mj.errors import UserError
 from epuck_mj.model import load_scene
 from evolution.champion import HELD_OUT_SEED, N_TEST
+from evolution.conditions import Conditions
 from evolution.config import NoiseLevel
 from evolution.experiment import Purpose, disturbances
 from evolution.held_out import HeldOut, Judge
@@ -38,6 +40,8 @@ class Options:
         arena: arena to test in; the one it evolved in if not given.
         noise: none for ideal sensors and motors; calibrated or strong for real ones.
         randomise: another robot in each trial; needs noise.
+        calibration: file of python -m epuck_mj.calibrate: that robot in all trials;
+            needs noise.
         threads: threads that step the robots; 0 is one per core. Changes no result.
         json: also write everything to this file.
     """
@@ -49,6 +53,7 @@ class Options:
     arena: str | None = None
     noise: NoiseLevel = "none"
     randomise: bool = False
+    calibration: Path | None = None
     threads: int = 0
     json: Path | None = None
 
@@ -72,8 +77,7 @@ def evaluate(argv: Sequence[str]) -> int:
         for path in options.paths
         for found in named_policies(path, options.generations)
     ]
-    if options.randomise and options.noise == "none":
-        raise UserError("--randomise needs --noise calibrated or strong, got none")
+    conditions = _conditions(options)
     judges: dict[tuple, Judge] = {}
     tests = []
     for candidate in candidates:
@@ -88,10 +92,9 @@ def evaluate(argv: Sequence[str]) -> int:
                     scene, candidate.task, candidate.start_clearance, options.threads
                 )
             met = disturbances(
-                options.noise,
-                options.randomise,
-                candidate.task.steps,
+                conditions,
                 options.starts,
+                candidate.task.steps,
                 HELD_OUT_SEED,
                 Purpose.TEST,
             )
@@ -102,14 +105,26 @@ def evaluate(argv: Sequence[str]) -> int:
                 "name": candidate.name,
                 "robot": robot,
                 "arena": arena,
-                "noise": options.noise,
-                "randomise": options.randomise,
             }
-            tests.append(where | asdict(test))
+            tests.append(where | asdict(conditions) | asdict(test))
     if options.json is not None:
         with files.writing(options.json.parent):
             files.write_text(options.json, json.dumps(tests, indent=1) + "\n")
     return 0
+
+
+def _conditions(options: Options) -> Conditions:
+    """What the robots are like.
+
+    Raises:
+        UserError: if that excludes itself.
+    """
+    path = options.calibration
+    calibration = None if path is None else Calibration.load(path)
+    try:
+        return Conditions(options.noise, options.randomise, calibration)
+    except ValueError as error:
+        raise UserError(str(error)) from None
 
 
 def _described(test: HeldOut, steps: int) -> str:

@@ -10,10 +10,11 @@ from enum import IntEnum
 
 import numpy as np
 
-from epuck_mj.disturbances import BOOK, NOISE, RANGES, Disturbances, draw
+from epuck_mj.disturbances import Disturbances
 from epuck_mj.errors import UserError
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.starts import FreeSpace
+from evolution.conditions import Conditions
 from evolution.config import ExperimentConfig
 from evolution.evaluation import BatchEngine, DmControlEngine, Engine, evaluate
 from evolution.optimizer import Optimizer, make_optimizer
@@ -156,14 +157,8 @@ class Experiment:
     def _disturbances(self, generation: int) -> Disturbances | None:
         """Of the trials of a generation, the same for every individual."""
         config, key = self.config, (Purpose.STARTS, generation)
-        return disturbances(
-            config.noise,
-            config.randomise,
-            config.steps,
-            config.trials,
-            config.seed,
-            *key,
-        )
+        n, steps, seed = config.trials, config.steps, config.seed
+        return disturbances(config.conditions, n, steps, seed, *key)
 
     def state(self) -> dict[str, np.ndarray]:
         """Everything that the next generations depend on, and what has been so far."""
@@ -226,23 +221,19 @@ def _optimizer(config: ExperimentConfig) -> Optimizer:
 
 
 def disturbances(
-    noise: str, randomise: bool, steps: int, n: int, seed: int, *key: int
+    conditions: Conditions, n: int, steps: int, seed: int, *key: int
 ) -> Disturbances | None:
     """What `n` trials meet, if anything.
 
     Args:
-        noise: name of a level.
-        randomise: whether robots differ.
-        steps: control steps of a trial.
+        conditions: what the robots are like.
         n: number of trials.
+        steps: control steps of a trial.
         seed: of all randomness.
         key: what the trials are for, and what else they depend on.
     """
-    level = NOISE[noise]
-    if level is None:
-        return None
     rng = random_generator(seed, Purpose.DISTURBANCES, *key)
-    return draw(rng, n, steps, level, RANGES if randomise else BOOK)
+    return conditions.draw(rng, n, steps)
 
 
 def make_engine(

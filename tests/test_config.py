@@ -90,6 +90,7 @@ COMMON = {
     "sensor_range": 0.04,
     "noise": "none",
     "randomise": False,
+    "calibration": None,
     "start_clearance": 0.01,
     "hidden": 4,
     "biases": False,

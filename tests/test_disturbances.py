@@ -1,14 +1,24 @@
 """Disturbances: robots as real ones, the same for everybody, the same at any speed."""
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
 
+from epuck_mj.calibration import Calibration
 from epuck_mj.constants import STEP_RATE_MAX, TRACK, WHEEL_RADIUS
 from epuck_mj.control import TaskParameters
 from epuck_mj.controller import Network
-from epuck_mj.disturbances import BOOK, NOISE, RANGES, Disturbances, Noise, draw
+from epuck_mj.disturbances import (
+    BOOK,
+    NOISE,
+    RANGES,
+    Disturbances,
+    Noise,
+    calibrated,
+    draw,
+)
 from epuck_mj.disturbed_robots import DisturbedRobots
 from epuck_mj.errors import UserError
 from epuck_mj.model import ROBOT_BODY, load_scene
@@ -80,7 +90,8 @@ def test_draws_stay_in_their_ranges_and_come_from_their_seed():
         again, other = drawn(3000), drawn(3000, seed=1)
         value = getattr(many, field.name)
         np.testing.assert_array_equal(getattr(again, field.name), value)
-        assert field.name == "of" or (getattr(other, field.name) != value).any()
+        same = field.name in ("of", "known_gains")
+        assert same or (getattr(other, field.name) != value).any()
 
 
 def test_the_book_has_one_robot():
@@ -217,6 +228,37 @@ CONFIG = ExperimentConfig.from_yaml(
 )
 
 
+CALIBRATION = Calibration((0.7,) * 4 + (1.3,) * 4, (0.0201, 0.0204), 0.055)
+
+
+def test_a_config_keeps_the_calibration_not_its_path(tmp_path):
+    CALIBRATION.save(tmp_path / "robot.yaml")
+    path = json.dumps(str(tmp_path / "robot.yaml"))
+    text = CONFIG.to_yaml().replace("randomise: true", "randomise: false")
+    text = text.replace("calibration: null", f"calibration: {path}")
+    config = ExperimentConfig.from_yaml(text, "test")
+    assert config.calibration == CALIBRATION
+    kept = config.to_yaml()
+    assert str(tmp_path) not in kept
+    (tmp_path / "robot.yaml").unlink()
+    assert ExperimentConfig.from_yaml(kept, "test") == config
+
+
+def test_a_known_robot_differs_from_one_whose_gains_nobody_knows(scene):
+    known = calibrated(CALIBRATION, np.random.default_rng(0), 3, STEPS, QUIET)
+    robots = robots_on(scene, STARTS, known)
+    deceived = robots_on(
+        scene, STARTS, dataclasses.replace(known, known_gains=np.ones((3, 8)))
+    )
+    reading, other = robots.reset(STARTS), deceived.reset(STARTS)
+    np.testing.assert_array_equal(reading.proximity, other.proximity)
+    assert reading.truth is not None
+    near = (reading.truth > 0) & (reading.truth < 0.04)
+    assert near.any()
+    np.testing.assert_allclose(reading.distance[near], reading.truth[near], atol=2e-3)
+    assert np.abs(other.distance - reading.truth)[near].min() > 1e-3
+
+
 def histories(config, **settings):
     experiment = Experiment(config, threads=1, **settings)
     steps = sum(record.control_steps for record in experiment.run())
@@ -228,7 +270,8 @@ def test_racing_and_seed_under_noise():
     lived, all_of_them = histories(CONFIG, racing=False)
     assert raced == lived
     assert fewer < all_of_them
-    for change in ({"seed": 2}, {"noise": "strong"}, {"randomise": False}):
+    own = {"randomise": False, "calibration": CALIBRATION}
+    for change in ({"seed": 2}, {"noise": "strong"}, {"randomise": False}, own):
         changed = CONFIG.model_copy(update=change)
         assert histories(changed)[0] != raced
 
@@ -242,10 +285,20 @@ def test_noise_of_generations_differs():
 
 
 def test_what_makes_no_sense_is_refused():
-    with pytest.raises(UserError, match=r"randomise needs noise"):
-        ExperimentConfig.from_yaml(
-            "{randomise: true, optimizer: {algorithm: random_search}}", "test"
-        )
+    for keys, message in {
+        "randomise: true": "randomise needs noise: calibrated or strong, got none",
+        "calibration: {track: 0.05}": "calibration needs noise: calibrated or strong",
+        "calibration: {}, noise: strong, randomise: true": "got both: many robots or",
+        "calibration: {tracks: 0.05}": "calibration: unknown tracks; available: prox",
+        "calibration: {track: -1}": "calibration: expected numbers above 0, got -1",
+        "calibration: [1, 2]": "expected keys of proximity_gains, wheel_radii, track",
+        "calibration: {wheel_radii: 0.02}": "expected 2 wheel_radii, got 0.02",
+        "calibration: no.yaml": "cannot read calibration 'no.yaml'",
+    }.items():
+        text = f"{{{keys}, optimizer: {{algorithm: random_search}}}}"
+        with pytest.raises(UserError, match=message) as caught:
+            ExperimentConfig.from_yaml(text, "test")
+        assert "\n" not in str(caught.value)
     scene = load_scene("epuck_planar", "arena")
     with pytest.raises(UserError, match=r"ideal robots only.*calibrated"):
         make_engine("dm_control", scene, CONFIG, 1)

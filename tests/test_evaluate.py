@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from epuck_mj.calibration import Calibration
 from epuck_mj.controller import load
 from epuck_mj.errors import UserError
 from epuck_mj.files import read_arrays
@@ -170,3 +171,28 @@ def test_the_most_believed_is_tested_too(finished):
     history = np.genfromtxt(finished / "history.csv", delimiter=",", names=True)
     assert scores["most_believed"]["stored"] == history["best"].max()
     assert 0 <= scores["most_believed"]["held_out"] <= 20
+
+
+def test_a_robot_that_was_measured(finished, tmp_path):
+    path, out = tmp_path / "robot.yaml", tmp_path / "out.json"
+    calibration = Calibration((0.7,) * 4 + (1.3,) * 4, (0.02, 0.0204), 0.055)
+    calibration.save(path)
+    own = ["--calibration", str(path)]
+    options = [str(finished), "--starts", "5", "--noise", "calibrated"]
+    means = []
+    for more in ([], ["--randomise"], own):
+        assert evaluate([*options, *more, "--json", str(out)]) == 0
+        means.append(tuple(test["mean"] for test in json.loads(out.read_text())))
+    assert len(set(means)) == 3
+    assert json.loads(out.read_text())[0]["calibration"] == {
+        "proximity_gains": list(calibration.proximity_gains),
+        "wheel_radii": list(calibration.wheel_radii),
+        "track": calibration.track,
+    }
+    for wrong, message in {
+        (str(finished), *own): "calibration needs noise: calibrated or strong, got",
+        (*options, *own, "--randomise"): "expected randomise or calibration, got both",
+        (*options, "--calibration", "no.yaml"): "cannot read calibration 'no.yaml'",
+    }.items():
+        with pytest.raises(UserError, match=message):
+            evaluate(list(wrong))

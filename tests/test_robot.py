@@ -121,10 +121,10 @@ def test_odometry_straight_and_on_the_spot():
 
 def test_odometry_of_a_circle_is_one():
     """Arcs are exact, in however few pieces."""
-    calibration = Calibration(wheel_radius=0.0203, track=0.0551)
+    calibration = Calibration(wheel_radii=(0.0201, 0.0205), track=0.0551)
     odometry = Odometry(calibration, np.zeros(3))
     made, now = np.zeros(2), 0.0
-    per_turn = 2 * math.pi * 0.0551 / (0.0203 * STEP_ANGLE)
+    per_turn = 2 * math.pi * 0.0551 / ((2 * 0.0205 - 0.0201) * STEP_ANGLE)
     odometry.update(Steps(0, 0), 0.0, 0.0)
     for _ in range(16):
         made += np.array([1.0, 2.0]) * per_turn / 16

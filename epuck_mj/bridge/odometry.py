@@ -28,10 +28,11 @@ class Odometry:
         """At rest.
 
         Args:
-            calibration: the robot's wheel radius and track.
+            calibration: the robot's wheel radii and track.
             start: pose `(3,)`: x, y [m], yaw [rad].
         """
-        self._calibration = calibration
+        self._step_lengths = STEP_ANGLE * np.array(calibration.wheel_radii)
+        self._track = calibration.track
         self._counters: Steps | None = None
         self._asked = 0.0
         self.pose = np.array(start, float)
@@ -65,8 +66,8 @@ class Odometry:
                 f"at most {possible:.0f} steps in {elapsed:.3f} s",
                 f"{steps[0]} and {steps[1]}: the robot was reset",
             )
-        left, right = steps * STEP_ANGLE * self._calibration.wheel_radius
-        distance, turn = (left + right) / 2, (right - left) / self._calibration.track
+        left, right = steps * self._step_lengths
+        distance, turn = (left + right) / 2, (right - left) / self._track
         # the chord of the arc, in the direction half-way round
         chord = distance * np.sinc(turn / (2 * np.pi))
         middle = self.pose[2] + turn / 2

@@ -85,7 +85,7 @@ class RealRobot:
         """
         self._connection = connection
         self._calibration = calibration
-        self._wheel_speed_max = speed_max / calibration.wheel_radius
+        self._wheel_speed_max = speed_max / max(calibration.wheel_radii)
         self._dry_run = dry_run
         self._clock = clock
         self.met = False

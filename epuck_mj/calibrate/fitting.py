@@ -8,16 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from epuck_mj.constants import BODY_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.motors import STEP_ANGLE
 from epuck_mj.sensors import proximity
 
-WHEEL_RADII = (0.015, 0.025)
+RADII = (0.015, 0.025)
 TRACKS = (0.045, 0.065)
 """From where to where e-pucks have them [m]. Chosen: 20 % and more beyond any known."""
 
 GAINS = (0.2, 5.0)
 """The same of the sensors' gains. Chosen: known ones are 0.6 to 1.5."""
+
+SIDES = ("left", "right")
+"""Of the wheels, in their order."""
 
 SATURATED = 3700
 """Counts from which a sensor says nothing of the distance.
@@ -119,19 +123,33 @@ def fit_gains(clearances: np.ndarray, counts: np.ndarray) -> SensorFit:
     return SensorFit(gains, np.sqrt((left**2).sum(axis=0) / n_used), used)
 
 
-def fit_wheel_radius(steps: float, length: float) -> float:
-    """On which the robot rolls [m].
+def fit_wheel_radii(
+    steps: float, forward: float, left: float, track: float
+) -> tuple[float, float]:
+    """On which the robot rolls, left and right [m]: wheels that differ drive an arc.
+
+    The front, which is what a person sees, is a body's radius ahead of the axle: if the
+    robot turned by `a`, it lies `tan(a / 2) = left / (forward + 2 BODY_RADIUS)` aside.
 
     Args:
         steps: that each motor made.
-        length: of the way [m].
+        forward: from where the front was to where it is, straight on [m].
+        left: the same to the left of straight on [m].
+        track: effective distance of the wheels [m].
 
     Raises:
         UserError: if no e-puck has such wheels.
     """
-    radius = length / (steps * STEP_ANGLE)
-    _check("a wheel radius", 1000 * radius, _millimetres(WHEEL_RADII), " mm")
-    return radius
+    turn = 2 * math.atan2(left, forward + 2 * BODY_RADIUS)
+    ahead = forward + BODY_RADIUS * (1 - math.cos(turn))
+    chord = math.hypot(ahead, left - BODY_RADIUS * math.sin(turn))
+    arc = chord / np.sinc(turn / (2 * np.pi))
+    angle = steps * STEP_ANGLE
+    wheels = [float(arc + side * turn * track / 2) / angle for side in (-1, 1)]
+    for name, radius in zip(SIDES, wheels, strict=True):
+        what = f"a radius of the {name} wheel"
+        _check(what, 1000 * radius, _millimetres(RADII), " mm")
+    return wheels[0], wheels[1]
 
 
 def fit_track(steps: float, wheel_radius: float, angle: float) -> float:

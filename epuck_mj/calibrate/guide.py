@@ -10,10 +10,11 @@ from epuck_mj.bridge.interruption import Interruption
 from epuck_mj.calibrate import measure
 from epuck_mj.calibrate.fitting import (
     SATURATED,
+    SIDES,
     SensorFit,
     fit_gains,
     fit_track,
-    fit_wheel_radius,
+    fit_wheel_radii,
     peaks,
 )
 from epuck_mj.calibrate.measure import Bench
@@ -30,6 +31,9 @@ RESIDUAL_MAX = 0.25
 
 LENGTHS = (0.05, 2.0)
 """What a ruler can have shown [m]; others are taken for slips of the pen."""
+
+DRIFTS = (-150.0, 150.0)
+"""The same to the left [mm]: wheels that differ by 12 %."""
 
 MISSES = (-360.0, 360.0)
 """The same of a protractor [degrees]."""
@@ -98,17 +102,22 @@ class Person:
 
 
 def straight(bench: Bench, person: Person, known: Calibration) -> Calibration:
-    """With the wheel radius by a ruler."""
+    """With the wheel radii by a ruler."""
     step_length = STEP_ANGLE * known.wheel_radius
-    _say("\nWheel radius: the robot drives straight on, you measure how far.")
+    _say("\nWheel radii: the robot drives straight on, you measure where it gets.")
     clear = measure.N_STEPS * step_length + 0.15
-    person.ready(f"Mark where its front is; leave {clear:.1f} m clear before it.")
+    person.ready(
+        "Mark where its front is, and a line from there straight on;\n"
+        f"leave {clear:.1f} m clear before it, 0.2 m to each side."
+    )
     steps = measure.straight(bench, known)
     _say(f"It stands. Each wheel made {steps:.0f} steps.")
-    length = person.number("How far did it go, in metres", *LENGTHS)
-    radius = fit_wheel_radius(steps, length)
-    _say(f"wheel radius {1000 * radius:.2f} mm; before {1000 * known.wheel_radius:.2f}")
-    return replace(known, wheel_radius=radius)
+    forward = person.number("How far did its front get, in metres", *LENGTHS)
+    _say("By how many millimetres is its front off the line?")
+    left = person.number("To the left is above 0, to the right below 0", *DRIFTS)
+    radii = fit_wheel_radii(steps, forward, left / 1000, known.track)
+    _say_radii(radii, known)
+    return replace(known, wheel_radii=radii)
 
 
 def turn(bench: Bench, person: Person, known: Calibration) -> Calibration:
@@ -123,9 +132,15 @@ def turn(bench: Bench, person: Person, known: Calibration) -> Calibration:
     _say("By how many degrees does its front miss the mark?")
     miss = person.number("Too far is above 0, not far enough is below 0", *MISSES)
     angle = 2 * math.pi * measure.N_TURNS + math.radians(miss)
-    track = fit_track(steps, known.wheel_radius, angle)
+    mean = known.wheel_radius
+    track = fit_track(steps, mean, angle)
     _say(f"track {1000 * track:.2f} mm; before {1000 * known.track:.2f}")
-    return replace(known, track=track)
+    # on the arc that was measured, wheels farther apart differ by more
+    wider = track / known.track
+    radii = tuple(mean + (radius - mean) * wider for radius in known.wheel_radii)
+    if radii != known.wheel_radii:
+        _say_radii(radii, known)
+    return replace(known, track=track, wheel_radii=radii)
 
 
 def sensors(bench: Bench, person: Person, known: Calibration) -> Calibration:
@@ -177,6 +192,11 @@ def table(counts: np.ndarray, fit: SensorFit) -> str:
                 f"{where}: left out"
             )
     return "\n".join(lines)
+
+
+def _say_radii(radii: tuple[float, ...], known: Calibration) -> None:
+    for name, radius, before in zip(SIDES, radii, known.wheel_radii, strict=True):
+        _say(f"{name} wheel radius {1000 * radius:.2f} mm; before {1000 * before:.2f}")
 
 
 def _say(text: str) -> None:

@@ -5,8 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from epuck_mj.constants import N_PROXIMITY, PROXIMITY_PERIOD, TRACK, WHEEL_RADIUS
-from epuck_mj.disturbances import N_WHEELS, Disturbances
+from epuck_mj.constants import (
+    N_PROXIMITY,
+    N_WHEELS,
+    PROXIMITY_PERIOD,
+    TRACK,
+    WHEEL_RADIUS,
+)
+from epuck_mj.disturbances import Disturbances
 
 WORLD_SEED = 0
 """Of the worlds: the same for every champion and every study."""
@@ -110,6 +116,7 @@ def met(world: World, index: int, n: int, steps: int) -> Disturbances:
     return Disturbances(
         of=np.arange(n),
         gains=same(gains),
+        known_gains=same(np.ones(N_PROXIMITY)),
         age=same(age),
         count_noise=world.count_noise * count_noise,
         wheel_gains=same(sides),
