@@ -2,6 +2,7 @@
 
 import os
 import pty
+import re
 import signal
 import subprocess
 import sys
@@ -155,6 +156,9 @@ def test_over_tcp_with_everything_asked_for(planar, tmp_path):
     assert "calibrated" in done.stdout
     trajectory = Trajectory.load(tmp_path / "log.npz")
     assert np.abs(trajectory.command).max() * WHEEL_RADIUS < 0.03 + 0.001
+    # what the operator sees is what was sent: 0.03 m/s are 233 steps/s
+    left, right = re.findall(r" D +(-?\d+) +(-?\d+) ", done.stdout)[-1]
+    assert 0 < max(abs(int(left)), abs(int(right))) <= 234
     # zeroed where it stood
     np.testing.assert_array_equal(trajectory.proximity[0], 0)
 
@@ -167,6 +171,8 @@ def test_a_dry_run(planar, port, tmp_path):
         assert not any(row[0] or row[2] for row in emulator.body.journal.command)
         np.testing.assert_allclose(emulator.body.pose, AT_WALL, atol=1e-6)
     assert "DRY RUN" in done.stdout
+    # what it would have done
+    assert not re.search(r" D +0 +0 ", done.stdout)
     trajectory = Trajectory.load(tmp_path / "log.npz")
     assert trajectory.steps == 10
     assert not trajectory.command.any()

@@ -36,7 +36,8 @@ class Options:
             WiFi tcp://host:1000.
         seconds: how long it drives [s].
         calibrate: first let the robot set its sensors' zero; nothing may be near it.
-        calibration: file on in what this robot differs from others.
+        calibration: file of python -m epuck_mj.calibrate: in what this robot differs
+            from others.
         pose: where it starts, x and y [m] and direction [degrees], for the log.
         max_speed: no wheel rolls faster than this [m/s]; if not given, as fast as any.
         dry_run: read and decide, but let the robot stand still.

@@ -4,13 +4,15 @@ import numpy as np
 
 from epuck_mj.bridge.robot import RealRobot
 from epuck_mj.bridge.session import Session, Step
-from epuck_mj.motors import step_rates
 
 
 def live_line(step: Step, robot: RealRobot) -> str:
-    """A control step in less than 80 characters: counts, speeds wanted, timing."""
+    """A control step in less than 80 characters: counts, speeds, timing.
+
+    Speeds are those sent; of a dry run, those that would have been.
+    """
     counts = " ".join(f"{count:4.0f}" for count in step.moment.proximity)
-    left, right = step_rates(step.control.command)
+    left, right = robot.told(step.control.command)
     return (
         f"{step.moment.time:5.1f} s ps {counts} D {left:5d} {right:5d} "
         f"{step.moment.latency * 1000:3.0f} ms {robot.schedule.n_overruns} over"

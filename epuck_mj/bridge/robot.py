@@ -151,7 +151,7 @@ class RealRobot:
             RobotRestarted: if it was reset.
             LinkLost: if the port is gone.
         """
-        rates = self._told(command)
+        rates = (0, 0) if self._dry_run else self.told(command)
         if rates != self._rates:
             # unknown until it has answered
             self._cycle(rates, changed=True)
@@ -161,10 +161,8 @@ class RealRobot:
         self.waited += self._clock() - before
         return self._sense()
 
-    def _told(self, command: np.ndarray) -> tuple[int, int]:
-        """Whole steps/s, both wheels slowed alike if one is too fast."""
-        if self._dry_run:
-            return 0, 0
+    def told(self, command: np.ndarray) -> tuple[int, int]:
+        """Whole steps/s for wheel speeds `(2,)` [rad/s], slowed alike if too fast."""
         fastest = float(np.abs(command).max())
         slowed = command * min(1.0, self._wheel_speed_max / max(fastest, STEP_ANGLE))
         left, right = step_rates(slowed).tolist()
