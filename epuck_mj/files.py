@@ -72,6 +72,20 @@ def writing(folder: Path) -> Iterator[None]:
         raise UserError(f"cannot write '{name}': {error.strerror}") from None
 
 
+def check_writable(path: Path) -> None:
+    """Nothing, if a file can be written there: better now than after the work.
+
+    Raises:
+        UserError: if not.
+    """
+    if is_directory(path):
+        raise UserError(f"cannot write '{path}': it is a folder")
+    if not is_directory(path.parent):
+        raise UserError(f"cannot write '{path}': no folder '{path.parent}'")
+    if not os.access(path.parent, os.W_OK):
+        raise UserError(f"cannot write '{path}': permission denied")
+
+
 def leftovers(folder: Path) -> list[Path]:
     """Temporary files of writers that were killed."""
     return list(folder.glob(".*-????????"))

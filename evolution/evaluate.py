@@ -78,6 +78,8 @@ def evaluate(argv: Sequence[str]) -> int:
         for found in named_policies(path, options.generations)
     ]
     conditions = _conditions(options)
+    if options.json is not None:
+        files.check_writable(options.json)
     judges: dict[tuple, Judge] = {}
     tests = []
     for candidate in candidates:

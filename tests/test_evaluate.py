@@ -192,6 +192,8 @@ def test_a_robot_that_was_measured(finished, tmp_path):
     for wrong, message in {
         (str(finished), *own): "calibration needs noise: calibrated or strong, got",
         (*options, *own, "--randomise"): "expected randomise or calibration, got both",
+        (*options, "--json", str(tmp_path)): "cannot write .* it is a folder",
+        (*options, "--json", "no/out.json"): "cannot write .*no folder 'no'",
         (*options, "--calibration", "no.yaml"): "cannot read calibration 'no.yaml'",
     }.items():
         with pytest.raises(UserError, match=message):

@@ -224,6 +224,7 @@ def test_ports_that_cannot_be_made(tmp_path):
         (["--scenario", "stall"], "expected faults as in stall@2"),
         (["--speed", "0"], "expected --speed above 0"),
         (["--latency", "-1"], "expected --latency from 0"),
+        (["--journal", "no/robot.npz"], "cannot write .*no folder 'no'"),
         (["--pose", "nan", "0", "0"], "expected --pose of finite numbers"),
         (["--tcp", "0", "--link", "x"], "expected one of --link, --tcp and --wifi"),
         (["--tcp", "99999"], "cannot listen on port 99999"),

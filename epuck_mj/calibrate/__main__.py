@@ -1,6 +1,5 @@
 """A robot is calibrated: `python -m epuck_mj.calibrate --port PORT`."""
 
-import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -18,7 +17,7 @@ from epuck_mj.calibrate.measure import Bench
 from epuck_mj.calibration import Calibration
 from epuck_mj.command_line import main, parse
 from epuck_mj.errors import UserError
-from epuck_mj.files import is_directory, is_file
+from epuck_mj.files import check_writable, is_file
 
 MODULE = "epuck_mj.calibrate"
 
@@ -78,7 +77,9 @@ def accomplish(
     Raises:
         UserError: if something cannot be; the robot stands.
     """
-    known = _known(output)
+    # a person has work with it before it is written
+    check_writable(output)
+    known = Calibration.load(output) if is_file(output) else Calibration()
     status, word = DONE, ""
     with Interruption() as interruption:
         bench = Bench(connect, interruption, clock, sleep)
@@ -104,22 +105,6 @@ def accomplish(
             print(flush=True)
             print(word, file=sys.stderr, flush=True)
     return status
-
-
-def _known(output: Path) -> Calibration:
-    """What the file says that will be written; the robot of the books if there is none.
-
-    Raises:
-        UserError: if it is something else, or cannot be written: better now than when
-            the robot has driven.
-    """
-    if is_directory(output):
-        raise UserError(f"cannot write '{output}': it is a folder")
-    if not is_directory(output.parent):
-        raise UserError(f"cannot write '{output}': no folder '{output.parent}'")
-    if not os.access(output.parent, os.W_OK):
-        raise UserError(f"cannot write '{output}': permission denied")
-    return Calibration.load(output) if is_file(output) else Calibration()
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from epuck_mj.bridge.fake.scenarios import random_scenario, scenario
 from epuck_mj.bridge.interruption import Interrupted, Interruption
 from epuck_mj.command_line import main, parse
 from epuck_mj.errors import UserError
+from epuck_mj.files import check_writable
 from epuck_mj.model import load_scene
 
 MODULE = "epuck_mj.bridge.fake"
@@ -114,6 +115,8 @@ def _endpoint(options: Options, folder: Path) -> Endpoint:
 def _check(options: Options) -> None:
     if sum(x is not None for x in (options.link, options.tcp, options.wifi)) > 1:
         raise UserError("expected one of --link, --tcp and --wifi")
+    if options.journal is not None:
+        check_writable(options.journal)
     if options.link is None and options.tcp is None and options.wifi is None:
         _check_terminals()
     if not 0 < options.speed <= 1000:
