@@ -16,7 +16,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.files import write_text, writing
 from evolution.gap.document import document, summary
 from evolution.gap.figure import kept_figure
-from evolution.gap.measure import Outcome, abroad, at_home
+from evolution.gap.measure import Outcome, abroad, ideal
 from evolution.gap.transfer import (
     Transfer,
     verdict,
@@ -81,8 +81,8 @@ def gap(argv: Sequence[str]) -> int:
     return 0
 
 
-Measured = tuple[list[Outcome], list[list[Outcome]]]
-"""At home, and in each world, an outcome per policy."""
+Measured = tuple[list[Outcome], list[list[Outcome]], list[list[Outcome]]]
+"""At home, as ideal robots in each world's arena, in each world; one per policy."""
 
 
 def _measured(
@@ -91,8 +91,13 @@ def _measured(
     robot: str,
     options: Options,
 ) -> Measured:
-    home = at_home(policies, robot, options.starts, options.threads)
-    outcomes = abroad(policies, places, robot, options.starts, options.threads)
+    n, threads = options.starts, options.threads
+    home = ideal(policies, robot, n, threads)
+    arenas = {
+        arena: ideal(policies, robot, n, threads, arena)
+        for arena in dict.fromkeys(place.arena for place in places)
+    }
+    outcomes = abroad(policies, places, robot, n, threads)
     bar = tqdm(
         outcomes,
         total=len(places),
@@ -100,7 +105,7 @@ def _measured(
         desc=robot,
         disable=not sys.stderr.isatty(),
     )
-    return home, list(bar)
+    return home, [arenas[place.arena] for place in places], list(bar)
 
 
 def _write(
@@ -119,7 +124,8 @@ def _write(
             robot: {
                 policy.name: {
                     **asdict(verdict(transfers[robot], i)),
-                    "abroad": [asdict(world[i]) for world in outcomes[1]],
+                    "ideal": [world[i].fitness for world in outcomes[1]],
+                    "abroad": [asdict(world[i]) for world in outcomes[2]],
                 }
                 for i, policy in enumerate(policies)
             }

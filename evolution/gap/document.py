@@ -84,8 +84,10 @@ def document(
             f"{len(names)} policies, frozen, in {n_worlds} worlds of a Latin "
             f"hypercube, on the first {starts} test starts. Home: the arena they "
             "evolved in, ideal sensors and motors, as many starts. A world is mastered "
-            f"with at least {SHARE_KEPT:.0%} of the fitness at home and fewer than "
-            f"{COLLISIONS_MAX:g} collision per minute. In brackets, 95 % intervals "
+            f"with at least {SHARE_KEPT:.0%} of the fitness kept and fewer than "
+            f"{COLLISIONS_MAX:g} collision per minute. Kept is the share of fitness at "
+            "home, or of an ideal robot's in that world's arena if that is more: "
+            "walls are found sooner in a smaller arena. In brackets, 95 % intervals "
             "over the worlds."
         ),
         summary(transfers, groups),

@@ -13,7 +13,7 @@ from evolution.report.figures.style import PAGE, PRINT, ROBOTS, color
 LINES = ("-", (0, (7, 2)), (0, (2, 1.5)), (0, (7, 1.5, 1.2, 1.5)))
 
 SHARE_END = 1.2
-"""Of the axis; some worlds are kinder than home."""
+"""Of the axis; noise helps some."""
 
 
 def kept_figure(
@@ -44,7 +44,7 @@ def kept_figure(
             axes.axvline(SHARE_KEPT, color="0.4", lw=0.8, ls=":")
             axes.set(
                 title=ROBOTS.get(robot, robot),
-                xlabel="share of the fitness at home, at least",
+                xlabel="share of the fitness kept, at least",
                 xlim=(0, SHARE_END),
                 ylim=(0, 1),
             )

@@ -1,4 +1,4 @@
-"""What champions are worth in each world, against what they are worth at home."""
+"""What champions are worth in each world, and as ideal robots."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -29,15 +29,22 @@ class Outcome:
     crash_rate: float
 
 
-def at_home(
-    policies: Sequence[NamedPolicy], robot: str, n: int, threads: int
+def ideal(
+    policies: Sequence[NamedPolicy],
+    robot: str,
+    n: int,
+    threads: int,
+    arena: str | None = None,
 ) -> list[Outcome]:
-    """Each policy in the arena it evolved in, on an ideal robot, on `n` test starts."""
+    """Each policy on an ideal robot, on `n` test starts, in the arena it evolved in.
+
+    Or all of them in the same `arena`.
+    """
     scenes = cache(lambda arena, step: load_scene(robot, arena, step))
     free = cache(FreeSpace)
     outcomes = []
     for policy in policies:
-        scene = scenes(policy.arena, policy.task.control_step)
+        scene = scenes(arena or policy.arena, policy.task.control_step)
         robots = SimulatedRobots(scene, n, threads)
         starts = starts_for_test(free(scene, policy.start_clearance), n)
         everybody = Everybody(policy.policy)

@@ -10,7 +10,7 @@ from evolution.gap.measure import Outcome
 from evolution.statistics import Interval, mean_interval, wilson
 
 SHARE_KEPT = 0.8
-"""Least share of its fitness at home that a policy keeps in a world it masters."""
+"""Least share of its fitness that a policy keeps in a world it masters."""
 
 COLLISIONS_MAX = 1.0
 """Collisions per minute from which on it has not mastered that world."""
@@ -22,29 +22,45 @@ class Transfer:
 
     Attributes:
         home: mean step fitness at home, `(p,)`.
-        fitness: the same in each world, `(w, p)`.
+        reference: what it is measured against in each world, `(w, p)`: fitness at home,
+            or on an ideal robot in that world's arena if that is more. Else a small
+            arena, where walls are soon found, would hide what sensors and motors cost.
+        fitness: mean step fitness in each world, `(w, p)`.
         collisions: per minute, `(w, p)`.
     """
 
     home: np.ndarray
+    reference: np.ndarray
     fitness: np.ndarray
     collisions: np.ndarray
 
     @classmethod
     def of(
-        cls, home: Sequence[Outcome], abroad: Sequence[Sequence[Outcome]]
+        cls,
+        home: Sequence[Outcome],
+        ideal: Sequence[Sequence[Outcome]],
+        abroad: Sequence[Sequence[Outcome]],
     ) -> "Transfer":
-        """From what was measured, one sequence of outcomes per world."""
+        """From what was measured.
+
+        Args:
+            home: an outcome per policy.
+            ideal: for each world, those on ideal robots in its arena.
+            abroad: for each world, those in it.
+        """
+        own = np.array([outcome.fitness for outcome in home])
+        there = np.array([[o.fitness for o in world] for world in ideal])
         return cls(
-            np.array([outcome.fitness for outcome in home]),
+            own,
+            np.maximum(own, there),
             np.array([[o.fitness for o in world] for world in abroad]),
             np.array([[o.collisions_per_minute for o in world] for world in abroad]),
         )
 
     @property
     def share(self) -> np.ndarray:
-        """Share of its fitness at home that each policy keeps, `(w, p)`; 0 of none."""
-        return self.fitness / np.maximum(self.home, np.finfo(float).tiny)
+        """Share of the reference that each policy keeps, `(w, p)`; 0 of none."""
+        return self.fitness / np.maximum(self.reference, np.finfo(float).tiny)
 
     @property
     def mastered(self) -> np.ndarray:
@@ -58,7 +74,7 @@ class Verdict:
 
     Attributes:
         home: mean step fitness at home.
-        share: mean share of that over the worlds.
+        share: mean share kept over the worlds.
         median_share: median over the worlds.
         collisions: mean per minute over the worlds.
         mastered: share of the worlds that were mastered.
