@@ -74,6 +74,9 @@ def _unboxed(text: str) -> str:
 EXTRAS = (
     (r"^Error parsing config\S*: ", ""),
     (r"^\d+ validation errors? for \w+ ", ""),
+    (r"^Value error, ", ""),
+    # of all keys together
+    (r" ?\[type=value_error, input_value=\{.*?, input_type=dict\]", ""),
     (r" ?\[type=\w+, input_value=(.*?), input_type=\w+\]", r", got \1"),
     (r" ?For further information visit \S+", ""),
 )

@@ -16,6 +16,7 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
+from tyro.constructors import PrimitiveConstructorSpec
 
 from epuck_mj.calibration import Calibration
 from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
@@ -71,6 +72,20 @@ def _calibration(value: Any) -> Any:
     return Calibration.from_dict(value)
 
 
+CalibrationConfig = Annotated[
+    Calibration | None,
+    BeforeValidator(_calibration),
+    # a flag takes the file only
+    PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="PATH",
+        instance_from_str=lambda words: Calibration.load(Path(words[0])),
+        is_instance=lambda value: value is None or isinstance(value, Calibration),
+        str_from_instance=lambda value: ["none" if value is None else "stored"],
+    ),
+]
+
+
 NoiseLevel = Literal["none", "calibrated", "strong"]
 """Keys of `epuck_mj.disturbances.NOISE`."""
 
@@ -109,7 +124,7 @@ class ExperimentConfig(BaseModel):
     randomise: StrictBool = Field(
         False, description="another robot in each trial; needs noise"
     )
-    calibration: Annotated[Calibration | None, BeforeValidator(_calibration)] = Field(
+    calibration: CalibrationConfig = Field(
         None,
         description="file of python -m epuck_mj.calibrate, or its keys: that robot "
         "in all trials; needs noise",

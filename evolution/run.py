@@ -36,8 +36,8 @@ class Options:
 
     Attributes:
         experiment: a shipped experiment (de-best, de-rand, ga, random-search,
-            one-plus-one-es, cma-es, de-best-calibrated, de-best-randomised) or a YAML
-            file; it comes first.
+            one-plus-one-es, cma-es, de-best-calibrated, de-best-randomised,
+            ga-randomised) or a YAML file; it comes first.
         config: the experiment's keys; a flag wins over the YAML.
         output: run directory, runs/<experiment>-seed-<seed> if not given.
         resume: run directory to go on with.

@@ -24,11 +24,12 @@ from matplotlib.image import imread
 from rerun.chunk import RrdReader
 
 from epuck_mj import controller, files
+from epuck_mj.calibration import Calibration
 from epuck_mj.errors import UserError
 from epuck_mj.model import MODELS
 from epuck_mj.trajectory import Trajectory
 from evolution import champion, execution, results
-from evolution.config import CONFIGS, find_config, load_config
+from evolution.config import CONFIGS, ExperimentConfig, find_config, load_config
 from evolution.experiment import HISTORY
 from evolution.held_out import Judge
 from evolution.optimizer import OPTIMIZERS
@@ -396,6 +397,18 @@ def test_a_flag_wins_over_the_yaml(here, capsys):
     assert (printed["control_step"], printed["robot"]) == (0.2, "epuck")
     assert printed["optimizer"]["mutation"] == 0.5
     assert printed["trials"] == 5
+
+
+def test_a_measured_robot_is_a_flag(here, capsys):
+    robot = Calibration(track=0.055)
+    robot.save(here / "robot.yaml")
+    flags = ["ga", "--calibration", "robot.yaml", "--print-config"]
+    assert run([*flags, "--noise", "calibrated"]) == 0
+    printed = ExperimentConfig.from_yaml(capsys.readouterr().out, "printed")
+    assert printed.calibration == robot
+    message = "^calibration needs noise: calibrated or strong, got none$"
+    with pytest.raises(UserError, match=message):
+        run(flags)
 
 
 def test_help_ends_well(capsys):
