@@ -16,6 +16,7 @@ from serial.tools import list_ports
 from epuck_mj.bridge import guardian
 from epuck_mj.bridge.connection import Clock, Port
 from epuck_mj.bridge.errors import BridgeError, LinkLost, NoReply, RobotRestarted
+from epuck_mj.bridge.losable_port import LosablePort
 from epuck_mj.bridge.protocol import RESYNC, Request, greets
 from epuck_mj.constants import BAUD_RATE
 from epuck_mj.errors import UserError
@@ -126,8 +127,7 @@ class Link:
         """
         self.clock = clock
         self._sleep = sleep
-        self._open_port = open_port
-        self._port: Port | None = open_port()
+        self._port = LosablePort(open_port)
         self.in_step = False
         self._rest = b""
         self._unanswered = False
@@ -135,13 +135,11 @@ class Link:
     @property
     def lost(self) -> bool:
         """Whether the port has to be opened again."""
-        return self._port is None
+        return self._port.lost
 
     def close(self) -> None:
         """Let go of the port."""
-        if self._port is not None:
-            self._port.close()
-            self._port = None
+        self._port.close()
 
     def reopen(self, until: float) -> None:
         """Open the lost port as soon as it is there again.
@@ -156,7 +154,7 @@ class Link:
         self.in_step, self._rest, self._unanswered = False, b"", False
         while True:
             try:
-                self._port = self._open_port()
+                self._port.reopen()
                 return
             except UserError as error:
                 if self.clock() >= until:
@@ -178,7 +176,7 @@ class Link:
             LinkLost: if the port is gone.
         """
         binary = request.out.endswith(b"\0")
-        stale = self._rest + self._receive(0.0)
+        stale = self._rest + self._port.receive(0.0)
         # half a banner may be in what is of no use here: `resync` looks at it again
         self._rest = stale
         if not self.in_step:
@@ -192,9 +190,9 @@ class Link:
         self._rest = b""
         parser = request.parser()
         deadline = min(self.clock() + request.patience, until)
-        self._send(request.out)
+        self._port.send(request.out)
         while (now := self.clock()) < deadline:
-            data = self._receive(deadline - now)
+            data = self._port.receive(deadline - now)
             if not data:
                 continue
             self._rest += data
@@ -224,7 +222,7 @@ class Link:
         restarted, came = False, b""
         while True:
             self.in_step = False
-            self._send(RESYNC.flush)
+            self._port.send(RESYNC.flush)
             dropped = self._rest + self.drain(until)
             self._rest = b""
             restarted |= greets(dropped)
@@ -255,7 +253,7 @@ class Link:
         came = b""
         heard = self.clock()
         while (now := self.clock()) < min(heard + RESYNC.quiet, until):
-            data = self._receive(heard + RESYNC.quiet - now)
+            data = self._port.receive(heard + RESYNC.quiet - now)
             if data:
                 came = (came + data)[-DROPPED_MAX:]
                 heard = self.clock()
@@ -268,28 +266,9 @@ class Link:
             LinkLost: if the port is gone.
         """
         self._rest = b""
-        self._receive(0.0)
-        self._send(RESYNC.flush)
+        self._port.receive(0.0)
+        self._port.send(RESYNC.flush)
         self.in_step = True
-
-    def _send(self, data: bytes) -> None:
-        try:
-            self._opened().send(data)
-        except LinkLost:
-            self.close()
-            raise
-
-    def _receive(self, timeout: float) -> bytes:
-        try:
-            return self._opened().receive(timeout)
-        except LinkLost:
-            self.close()
-            raise
-
-    def _opened(self) -> Port:
-        if self._port is None:
-            raise LinkLost("an open port", "one that was lost")
-        return self._port
 
 
 DROPPED_MAX = 1024

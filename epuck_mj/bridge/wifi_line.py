@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 from epuck_mj.bridge.connection import Clock, Greeting, Port
 from epuck_mj.bridge.errors import BridgeError, LinkLost, NoReply, StillMoving
+from epuck_mj.bridge.losable_port import LosablePort
 from epuck_mj.bridge.packets import PacketParser, command
 from epuck_mj.bridge.replies import Cycle, Sensors, Steps
 from epuck_mj.constants import (
@@ -52,15 +53,14 @@ class WifiLine:
         Raises:
             UserError: if nobody is there.
         """
-        self._open_port = open_port
         self._clock = clock
         self._sleep = sleep
-        self._port: Port | None = open_port()
+        self._port = LosablePort(open_port)
         self._parser = PacketParser()
 
     def greet(self) -> Greeting:
         """See Connection."""
-        self._send(command(0, 0))
+        self._port.send(command(0, 0))
         sensors = self._next(self._clock() + CONNECT_TIME_MAX)
         self.stop()
         return Greeting(
@@ -75,15 +75,15 @@ class WifiLine:
             LinkLost: if the connection is gone.
         """
         if changed:
-            self._send(command(left, right))
+            self._port.send(command(left, right))
         self._drop()
         sensors = self._next(until)
         return Cycle(sensors.proximity, sensors.steps)
 
     def calibrate(self) -> None:
         """See Connection; nobody says when it is done, so all its time goes by."""
-        self._send(command(0, 0, calibrate=True))
-        self._send(command(0, 0))
+        self._port.send(command(0, 0, calibrate=True))
+        self._port.send(command(0, 0))
         end = self._clock() + CALIBRATION_TIME_MAX
         while self._clock() < end:
             self._next(end + WIFI_PERIOD + STOP_REPLY_TIME)
@@ -94,8 +94,9 @@ class WifiLine:
         problem: BridgeError = NoReply("counters at rest", "nothing")
         while self._clock() < until:
             try:
-                if self._port is None:
-                    self._port, self._parser = self._open_port(), PacketParser()
+                if self._port.lost:
+                    self._port.reopen()
+                    self._parser = PacketParser()
                 if self._rests():
                     return
                 problem = NoReply("step counters at rest", "others all the time")
@@ -107,13 +108,11 @@ class WifiLine:
 
     def close(self) -> None:
         """See Connection."""
-        if self._port is not None:
-            self._port.close()
-            self._port = None
+        self._port.close()
 
     def _rests(self) -> bool:
         """Whether it stands after it was told to."""
-        self._send(command(0, 0))
+        self._port.send(command(0, 0))
         self._drop()
         # commands wait for their turn: what it does now says nothing yet
         self._next(self._clock() + STOP_REPLY_TIME)
@@ -128,32 +127,13 @@ class WifiLine:
 
     def _drop(self) -> None:
         """Forget the packets that are here, but keep in step with half ones."""
-        while data := self._receive(0.0):
+        while data := self._port.receive(0.0):
             self._parser.feed(data)
 
     def _next(self, until: float) -> Sensors:
         """The latest of the packets that come next."""
         while (now := self._clock()) < until:
-            found = self._parser.feed(self._receive(until - now))
+            found = self._parser.feed(self._port.receive(until - now))
             if found:
                 return found[-1]
         raise NoReply("a packet of an e-puck2 in time", "nothing")
-
-    def _send(self, data: bytes) -> None:
-        try:
-            self._opened().send(data)
-        except LinkLost:
-            self.close()
-            raise
-
-    def _receive(self, timeout: float) -> bytes:
-        try:
-            return self._opened().receive(timeout)
-        except LinkLost:
-            self.close()
-            raise
-
-    def _opened(self) -> Port:
-        if self._port is None:
-            raise LinkLost("an open connection", "one that was lost")
-        return self._port
