@@ -23,12 +23,12 @@ import numpy as np
 import tyro
 from dm_control.rl import control
 
-from epuck_mj.control import TaskParameters, run_trials
+from epuck_mj.control import TaskParameters
 from epuck_mj.controller import Controller, Network
 from epuck_mj.model import Scene, load_scene
-from epuck_mj.simulation import SimulatedRobots
 from epuck_mj.starts import FreeSpace
 from epuck_mj.tasks import FollowWalls, environment
+from evolution.evaluation import BatchEngine
 
 ROBOTS = ("epuck", "epuck_planar")
 N_ROBOTS = 750
@@ -85,14 +85,14 @@ def measure(robot: str, repeats: int) -> dict[str, float]:
     task = TaskParameters(steps=100)
     starts = FreeSpace(scene, 0.12).sample(np.random.default_rng(0), N_ROBOTS)
     controller = Network().decode(_harmless(N_ROBOTS))
-    one, two = (SimulatedRobots(scene, N_ROBOTS, threads) for threads in (1, 2))
-    whole = TaskParameters()
+    one, two = (BatchEngine(scene, task, threads) for threads in (1, 2))
+    whole, n_substeps = TaskParameters(), scene.n_substeps
     env = environment(scene, FollowWalls(scene, whole, starts=itertools.cycle(starts)))
     turns = [
         Turn(
             mj_step=_rate(lambda: _mj_step(scene)),
-            batch_1=_rate(lambda: _batch(one, controller, starts, task)),
-            batch_2=_rate(lambda: _batch(two, controller, starts, task)),
+            batch_1=_rate(lambda: _batch(one, controller, starts, task) * n_substeps),
+            batch_2=_rate(lambda: _batch(two, controller, starts, task) * n_substeps),
             dm_control=_rate(lambda: _dm_control(env, controller)),
         )
         for _ in range(repeats)
@@ -139,15 +139,15 @@ def _mj_step(scene: Scene, n_steps: int = 50_000) -> int:
 
 
 def _batch(
-    robots: SimulatedRobots,
+    engine: BatchEngine,
     controller: Controller,
     starts: np.ndarray,
     task: TaskParameters,
 ) -> int:
-    """Our evaluator: a generation of trials, policy and fitness included."""
-    trials = run_trials(robots, controller, starts, task)
+    """Control steps of our evaluator: a generation, policy and fitness included."""
+    trials = engine.run(controller, starts)
     assert trials.steps.min() == task.steps, "a crash would spoil the measurement"
-    return int(trials.steps.sum()) * robots.scene.n_substeps
+    return int(trials.steps.sum())
 
 
 def _dm_control(

@@ -20,10 +20,8 @@ from epuck_mj.starts import FreeSpace
 from epuck_mj.tracks import record_tracks
 from epuck_mj.wall_loops import wall_loops
 from evolution.champion import N_TEST, starts_for_test
+from evolution.evaluation import CAPACITY
 from evolution.statistics import mean_interval, worst_share_mean
-
-CAPACITY = 256
-"""Robots simulated at once: bounds memory, changes no result."""
 
 INTERVAL_SEED = 0
 """Of the bootstrap's resamples, so that the same trials give the same interval."""
