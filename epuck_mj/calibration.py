@@ -3,7 +3,6 @@
 Made by `python -m epuck_mj.calibrate`, read by simulation and bridge alike.
 """
 
-import math
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Self
@@ -14,6 +13,12 @@ import yaml
 from epuck_mj.constants import N_PROXIMITY, N_WHEELS, TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.files import write_text, writing
+
+GAIN_MAX = 100.0
+"""What no sensor's gain reaches."""
+
+LENGTH_MAX = 1.0
+"""The same of wheel radii and track [m]: millimetres are noticed."""
 
 
 @dataclass(frozen=True)
@@ -36,10 +41,18 @@ class Calibration:
             numbers = getattr(self, name)
             if not (isinstance(numbers, tuple) and len(numbers) == size):
                 raise ValueError(f"expected {size} {name}, got {numbers!r}")
-        for number in (*self.proximity_gains, *self.wheel_radii, self.track):
-            real = isinstance(number, int | float) and math.isfinite(number)
-            if not (real and number > 0):
-                raise ValueError(f"expected numbers above 0, got {number!r}")
+        lengths = (*self.wheel_radii, self.track)
+        for numbers, most, unit in (
+            (self.proximity_gains, GAIN_MAX, ""),
+            (lengths, LENGTH_MAX, " m"),
+        ):
+            for number in numbers:
+                real = isinstance(number, int | float) and number is not True
+                if not (real and 0 < number < most):
+                    raise ValueError(
+                        f"expected numbers above 0 and below {most:g}{unit}, "
+                        f"got {number!s:.20}"
+                    )
 
     @property
     def gains(self) -> np.ndarray:
@@ -76,7 +89,7 @@ class Calibration:
         try:
             content = yaml.safe_load(path.read_text(encoding="utf-8"))
             return cls.from_dict(content)
-        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
             reason = " ".join(str(error).split())
             raise UserError(f"cannot read calibration '{path}': {reason}") from None
         except ValueError as error:

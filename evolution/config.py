@@ -62,14 +62,21 @@ def _calibration(value: Any) -> Any:
     """A calibration in the config itself, which is how one of a file is kept.
 
     Raises:
-        UserError: if a file is named that is none.
-        ValueError: if it is anything else.
+        ValueError: if it is none.
     """
     if value is None or isinstance(value, Calibration):
         return value
-    if isinstance(value, str):
+    if not isinstance(value, str):
+        return Calibration.from_dict(value)
+    try:
         return Calibration.load(Path(value))
-    return Calibration.from_dict(value)
+    except UserError as error:
+        raise ValueError(str(error)) from None
+
+
+def _calibration_flag(value: str) -> Calibration | None:
+    """The file that a flag names; `none` is the robot of the books."""
+    return None if value == "none" else Calibration.load(Path(value))
 
 
 CalibrationConfig = Annotated[
@@ -79,9 +86,9 @@ CalibrationConfig = Annotated[
     PrimitiveConstructorSpec(
         nargs=1,
         metavar="PATH",
-        instance_from_str=lambda words: Calibration.load(Path(words[0])),
+        instance_from_str=lambda words: _calibration_flag(words[0]),
         is_instance=lambda value: value is None or isinstance(value, Calibration),
-        str_from_instance=lambda value: ["none" if value is None else "stored"],
+        str_from_instance=lambda value: ["none" if value is None else "as stored"],
     ),
 ]
 
@@ -298,6 +305,9 @@ def one_line(error: ValidationError) -> str:
             parts.append(f"unknown key '{key}'; available: {available}")
         elif detail["type"] == "missing":
             parts.append(f"key '{key}' is missing")
+        elif not detail["loc"]:
+            # of several keys together
+            parts.append(detail["msg"].removeprefix("Value error, "))
         else:
             message = detail["msg"].removeprefix("Value error, ")
             parts.append(f"{key}: {message}, got {_shown(detail['input'])}")

@@ -23,7 +23,10 @@ from epuck_mj.simulation import SimulatedRobots
 from epuck_mj.tasks import FollowWalls, environment
 
 CAPACITY = 256
-"""Robots simulated at once: changes no result. More of them leave the cache."""
+"""Robots simulated at once: changes no result. More of them leave the cache.
+
+An individual with more trials is not raced.
+"""
 
 ROUNDING = 1e-9
 """By how much an individual must have lost its race: sums of floats are inexact."""

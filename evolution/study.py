@@ -35,7 +35,7 @@ class Options:
     a crash or a power cut, or to add seeds and experiments.
 
     Attributes:
-        study: a shipped study (paper, wheels, quick) or a YAML file.
+        study: a shipped study (paper, wheels, transfer, quick) or a YAML file.
         output: study directory.
         seeds: as 1-30 or 1,3,5-8.
         experiments: only these of the study, separated by commas.

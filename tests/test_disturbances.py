@@ -286,14 +286,18 @@ def test_noise_of_generations_differs():
 
 def test_what_makes_no_sense_is_refused():
     for keys, message in {
-        "randomise: true": "randomise needs noise: calibrated or strong, got none",
+        "randomise: true": "^test: randomise needs noise: .* or strong, got none$",
         "calibration: {track: 0.05}": "calibration needs noise: calibrated or strong",
         "calibration: {}, noise: strong, randomise: true": "got both: many robots or",
         "calibration: {tracks: 0.05}": "calibration: unknown tracks; available: prox",
-        "calibration: {track: -1}": "calibration: expected numbers above 0, got -1",
+        "calibration: {track: -1}": "numbers above 0 and below 1 m, got -1",
+        "calibration: {track: 53}": "numbers above 0 and below 1 m, got 53",
+        "calibration: {track: true}": "above 0 and below 1 m, got True",
+        f"calibration: {{track: {'9' * 400}}}": "above 0 and below 1 m, got 9{20}",
+        "calibration: {proximity_gains: [.nan, 1, 1, 1, 1, 1, 1, 1]}": "got nan",
         "calibration: [1, 2]": "expected keys of proximity_gains, wheel_radii, track",
         "calibration: {wheel_radii: 0.02}": "expected 2 wheel_radii, got 0.02",
-        "calibration: no.yaml": "cannot read calibration 'no.yaml'",
+        "calibration: no.yaml": "^test: calibration: cannot read calibration 'no.yaml'",
     }.items():
         text = f"{{{keys}, optimizer: {{algorithm: random_search}}}}"
         with pytest.raises(UserError, match=message) as caught:

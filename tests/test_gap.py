@@ -90,6 +90,15 @@ def test_a_world_like_home_keeps_everything(robot):
     assert hurt.fitness < 0.5 * home.fitness
 
 
+def test_ideal_robots_in_another_arena():
+    (home,) = ideal([FOLLOWER], "epuck_planar", 20, 1)
+    (same,) = ideal([FOLLOWER], "epuck_planar", 20, 1, "arena")
+    (small,) = ideal([FOLLOWER], "epuck_planar", 20, 1, "small_square")
+    assert same == home
+    # no wall is far away
+    assert small.fitness > 1.1 * home.fitness
+
+
 def test_threads_and_company_change_nothing():
     other = named_policies(str(CHAMPION))
     places = worlds(3)[:2]

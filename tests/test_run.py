@@ -406,6 +406,18 @@ def test_a_measured_robot_is_a_flag(here, capsys):
     assert run([*flags, "--noise", "calibrated"]) == 0
     printed = ExperimentConfig.from_yaml(capsys.readouterr().out, "printed")
     assert printed.calibration == robot
+    # and one of the YAML's can be taken away
+    printed_again = [
+        str(here / "mine.yaml"),
+        "--calibration",
+        "none",
+        "--noise",
+        "none",
+    ]
+    (here / "mine.yaml").write_text(printed.to_yaml())
+    assert run([*printed_again, "--print-config"]) == 0
+    without = ExperimentConfig.from_yaml(capsys.readouterr().out, "printed")
+    assert without == load_config(find_config("ga"))
     message = "^calibration needs noise: calibrated or strong, got none$"
     with pytest.raises(UserError, match=message):
         run(flags)

@@ -1,9 +1,10 @@
-"""From what was measured to a robot's sensor gains, wheel radius and track.
+"""From what was measured to a robot's sensor gains, wheel radii and track.
 
 What no e-puck has is refused: then something was measured wrongly.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,9 +65,10 @@ def peaks(yaw: np.ndarray, counts: np.ndarray) -> np.ndarray:
     be wrong, and the highest of many noisy ones is too high.
 
     The sensors sit on the shell's rim and look away from the axle's middle, about which
-    the robot turns: so a ray is shortest where it meets the wall squarely, and then as
-    long as the clearance. Where directions and places are published apart, they differ
-    by up to 3 degrees, which makes that less than 0.1 mm. WEBOTS.
+    a robot with equal wheels turns: so a ray is shortest where it meets the wall
+    squarely, and then as long as the clearance. Where directions and places are
+    published apart, they differ by up to 3 degrees, which makes that less than 0.1 mm.
+    WEBOTS.
 
     Args:
         yaw: of the robot at each reading, not wrapped [rad], `(n,)`.
@@ -146,10 +148,19 @@ def fit_wheel_radii(
     arc = chord / np.sinc(turn / (2 * np.pi))
     angle = steps * STEP_ANGLE
     wheels = [float(arc + side * turn * track / 2) / angle for side in (-1, 1)]
-    for name, radius in zip(SIDES, wheels, strict=True):
+    check_wheel_radii(wheels)
+    return wheels[0], wheels[1]
+
+
+def check_wheel_radii(radii: Sequence[float]) -> None:
+    """Nothing, if an e-puck can have wheels of such radii [m].
+
+    Raises:
+        UserError: if not.
+    """
+    for name, radius in zip(SIDES, radii, strict=True):
         what = f"a radius of the {name} wheel"
         _check(what, 1000 * radius, _millimetres(RADII), " mm")
-    return wheels[0], wheels[1]
 
 
 def fit_track(steps: float, wheel_radius: float, angle: float) -> float:

@@ -12,6 +12,7 @@ from epuck_mj.calibrate.fitting import (
     SATURATED,
     SIDES,
     SensorFit,
+    check_wheel_radii,
     fit_gains,
     fit_track,
     fit_wheel_radii,
@@ -33,7 +34,7 @@ LENGTHS = (0.05, 2.0)
 """What a ruler can have shown [m]; others are taken for slips of the pen."""
 
 DRIFTS = (-150.0, 150.0)
-"""The same to the left [mm]: wheels that differ by 12 %."""
+"""The same to the left [mm]: wheels that differ by 5 %."""
 
 MISSES = (-360.0, 360.0)
 """The same of a protractor [degrees]."""
@@ -107,7 +108,7 @@ def straight(bench: Bench, person: Person, known: Calibration) -> Calibration:
     _say("\nWheel radii: the robot drives straight on, you measure where it gets.")
     clear = measure.N_STEPS * step_length + 0.15
     person.ready(
-        "Mark where its front is, and a line from there straight on;\n"
+        "Mark where its front is, and a line from there to where it points;\n"
         f"leave {clear:.1f} m clear before it, 0.2 m to each side."
     )
     steps = measure.straight(bench, known)
@@ -138,6 +139,7 @@ def turn(bench: Bench, person: Person, known: Calibration) -> Calibration:
     # on the arc that was measured, wheels farther apart differ by more
     wider = track / known.track
     radii = tuple(mean + (radius - mean) * wider for radius in known.wheel_radii)
+    check_wheel_radii(radii)
     if radii != known.wheel_radii:
         _say_radii(radii, known)
     return replace(known, track=track, wheel_radii=radii)

@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from epuck_mj.command_line import check_threads, parse
 from epuck_mj.errors import UserError
-from epuck_mj.files import write_text, writing
+from epuck_mj.files import check_writable, write_text, writing
 from evolution.gap.document import document, summary
 from evolution.gap.figure import kept_figure
 from evolution.gap.measure import Outcome, abroad, ideal
@@ -75,6 +75,7 @@ def gap(argv: Sequence[str]) -> int:
     robots = [options.robot] if options.robot else [PLANAR_ROBOT, WHEELED_ROBOT]
     with writing(options.output):
         options.output.mkdir(parents=True, exist_ok=True)
+    check_writable(options.output / "gap.md")
     measured = {robot: _measured(policies, places, robot, options) for robot in robots}
     _write(options.output, policies, places, measured, options)
     print((options.output / "gap.md").read_text(encoding="utf-8"), end="")
