@@ -39,10 +39,10 @@ recording: $(INSTALLED)
 bridge: $(INSTALLED)
 	$(BIN)/python -m benchmarks.bridge --json results/bridge.json
 
-# champions of the studies in pseudo-realities
+# champions of three seeds of each experiment in pseudo-realities, on both robots
 gap: $(INSTALLED)
-	$(BIN)/python -m evolution.gap results/paper wall-follower \
-	  --robot epuck_planar --output results/gap
+	$(BIN)/python -m evolution.gap $(wildcard results/paper/*/seed-[123]) \
+	  results/transfer wall-follower --output results/gap
 
 # what git keeps of the studies in runs/, and everything that is made of it
 results: $(INSTALLED)

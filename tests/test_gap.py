@@ -146,6 +146,12 @@ def test_shares_and_mastered_worlds():
             [False, False, True],
         ],
     )
+    against_home = TRANSFER.mastered_against_home
+    # a collision a minute is too many, whatever it is measured against
+    assert against_home[:, 1].tolist() == [True, False, False, False]
+    kinder = replace(TRANSFER, reference=2 * TRANSFER.reference)
+    assert not kinder.mastered[:, 0].any()
+    np.testing.assert_array_equal(kinder.mastered_against_home, against_home)
     found = verdict(TRANSFER, 0)
     assert found.home == 0.5
     np.testing.assert_allclose(found.share.value, np.mean([1, 0.82, 0.4, 0.6]))
@@ -178,7 +184,7 @@ def test_the_document_says_who_kept_what():
     assert "| a | a/seed-1 | 0.500 |" in text
     assert "50% [15%, 85%]" in text
     # kept 70.5 % and 81.25 %, mastered 50 % and 25 %
-    assert "| a | epuck | 2 | 0.450 | 76% | 0.2 | 38% |" in text
+    assert "| a | epuck | 2 | 0.450 | 76% | 0.2 | 38% | 38% |" in text
     assert "Rank correlation" in text
 
 

@@ -34,6 +34,7 @@ GROUP_COLUMNS = (
     "kept",
     "collisions per minute",
     "worlds mastered",
+    "against home",
 )
 
 
@@ -49,15 +50,21 @@ def summary(
     rows = []
     for group, members in groups.items():
         for robot, transfer in transfers.items():
-            share, collisions, mastered = (
+            share, collisions, mastered, against_home = (
                 float(np.median(values[:, members].mean(axis=0)))
-                for values in (transfer.share, transfer.collisions, transfer.mastered)
+                for values in (
+                    transfer.share,
+                    transfer.collisions,
+                    transfer.mastered,
+                    transfer.mastered_against_home,
+                )
             )
             home = float(np.median(transfer.home[members]))
             rows.append(
                 [
                     *(group, robot, str(len(members)), f"{home:.3f}"),
-                    *(f"{share:.0%}", f"{collisions:.1f}", f"{mastered:.0%}"),
+                    *(f"{share:.0%}", f"{collisions:.1f}"),
+                    *(f"{mastered:.0%}", f"{against_home:.0%}"),
                 ]
             )
     return Table(GROUP_COLUMNS, rows, texts=2)
@@ -87,8 +94,9 @@ def document(
             f"with at least {SHARE_KEPT:.0%} of the fitness kept and fewer than "
             f"{COLLISIONS_MAX:g} collision per minute. Kept is the share of fitness at "
             "home, or of an ideal robot's in that world's arena if that is more: "
-            "walls are found sooner in a smaller arena. In brackets, 95 % intervals "
-            "over the worlds."
+            "walls are found sooner in a smaller arena. Against home: mastered if "
+            "the fitness at home is all that counts. In brackets, 95 % intervals over "
+            "the worlds."
         ),
         summary(transfers, groups),
         Paragraph("Medians over the policies of an experiment, of their means."),

@@ -60,12 +60,20 @@ class Transfer:
     @property
     def share(self) -> np.ndarray:
         """Share of the reference that each policy keeps, `(w, p)`; 0 of none."""
-        return self.fitness / np.maximum(self.reference, np.finfo(float).tiny)
+        return _share(self.fitness, self.reference)
 
     @property
     def mastered(self) -> np.ndarray:
         """Which worlds each policy masters, `(w, p)`."""
-        return (self.share >= SHARE_KEPT) & (self.collisions < COLLISIONS_MAX)
+        return self._mastered(self.share)
+
+    @property
+    def mastered_against_home(self) -> np.ndarray:
+        """The same if what counts is the share of its fitness at home, `(w, p)`."""
+        return self._mastered(_share(self.fitness, self.home))
+
+    def _mastered(self, share: np.ndarray) -> np.ndarray:
+        return (share >= SHARE_KEPT) & (self.collisions < COLLISIONS_MAX)
 
 
 @dataclass(frozen=True)
@@ -121,6 +129,10 @@ def between_robots(one: Transfer, other: Transfer) -> float | None:
     if len(one.home) < 3:
         return None
     return _spearman(one.fitness.mean(axis=0), other.fitness.mean(axis=0))
+
+
+def _share(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
+    return part / np.maximum(whole, np.finfo(float).tiny)
 
 
 def _spearman(a: np.ndarray, b: np.ndarray) -> float:
