@@ -40,8 +40,9 @@ def publish(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
     parse(Options, "python -m benchmarks.publish", argv, Options())
     for name in (*REPORTED, TRANSFER):
-        if (Path("runs") / name).is_dir():
-            ship(Path("runs") / name, Path("results") / name)
+        source = Path("runs") / name
+        if any(source.glob("*/seed-*/champion.json")):
+            ship(source, Path("results") / name)
     paper, *others = (str(path) for path in shipped(Path("results")))
     wheels = [argument for path in others for argument in ("--wheels", path)]
     reproduce(["--study", paper, *wheels, "--output", "results"])

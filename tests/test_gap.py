@@ -134,6 +134,9 @@ TRANSFER = Transfer.of(
 )
 
 
+LATENCY = np.array([0, 2, 2, 0])
+
+
 def test_shares_and_mastered_worlds():
     np.testing.assert_allclose(TRANSFER.share[:, 0], [1, 0.82, 0.4, 0.6])
     np.testing.assert_allclose(TRANSFER.share[:, 1], [1, 0.5, 1, 0.75])
@@ -179,13 +182,16 @@ def test_rank_correlations_of_hand_made_worlds():
 def test_the_document_says_who_kept_what():
     names = ["a/seed-1", "a/seed-2", "b"]
     groups = {"a": [0, 1], "b": [2]}
-    text = to_markdown(document(names, {"epuck": TRANSFER}, groups, 5))
+    text = to_markdown(document(names, {"epuck": TRANSFER}, groups, 5, LATENCY))
     assert "3 policies, frozen, in 4 worlds" in text
     assert "| a | a/seed-1 | 0.500 |" in text
     assert "50% [15%, 85%]" in text
     # kept 70.5 % and 81.25 %, mastered 50 % and 25 %
     assert "| a | epuck | 2 | 0.450 | 76% | 0.2 | 38% | 38% |" in text
     assert "Rank correlation" in text
+    # late in the second and the third world: shares 0.82, 0.4 and 0.5, 1
+    assert "| experiment | robot | n | 0 | 2 |" in text
+    assert "| a | epuck | 2 | 84% | 68% |" in text
 
 
 def test_the_command_writes_what_it_measured(tmp_path, capsys):

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
+import numpy as np
 import tyro
 from tqdm import tqdm
 
@@ -137,7 +138,8 @@ def _write(
         write_text(folder / "gap.json", json.dumps(record, indent=1) + "\n")
         write_text(folder / "gap.csv", _rows(policies, places, transfers))
         names = [policy.name for policy in policies]
-        blocks = document(names, transfers, groups, options.starts)
+        latency = np.array([place.latency for place in places])
+        blocks = document(names, transfers, groups, options.starts, latency)
         write_text(folder / "gap.md", to_markdown(blocks))
         table = to_markdown([summary(transfers, groups)])
         write_text(folder / "summary.md", table)

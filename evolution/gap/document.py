@@ -70,11 +70,36 @@ def summary(
     return Table(GROUP_COLUMNS, rows, texts=2)
 
 
+def by_latency(
+    transfers: Mapping[str, Transfer],
+    groups: Mapping[str, Sequence[int]],
+    latency: np.ndarray,
+) -> Table:
+    """What is kept when commands are late: a row per experiment and robot, mean shares.
+
+    Args:
+        transfers: by robot.
+        groups: indices of the policies of each experiment.
+        latency: of each world, in control steps, `(w,)`.
+    """
+    late = np.unique(latency)
+    rows = [
+        [
+            *(group, robot, str(len(members))),
+            *(f"{transfer.share[latency == n][:, members].mean():.0%}" for n in late),
+        ]
+        for group, members in groups.items()
+        for robot, transfer in transfers.items()
+    ]
+    return Table(("experiment", "robot", "n", *map(str, late)), rows, texts=2)
+
+
 def document(
     names: Sequence[str],
     transfers: Mapping[str, Transfer],
     groups: Mapping[str, Sequence[int]],
     starts: int,
+    latency: np.ndarray,
 ) -> list[Block]:
     """What was found.
 
@@ -83,6 +108,7 @@ def document(
         transfers: by robot, at least one.
         groups: indices of the policies of each experiment.
         starts: of each world, and at home.
+        latency: of each world, in control steps, `(w,)`.
     """
     n_worlds = len(next(iter(transfers.values())).fitness)
     blocks: list[Block] = [
@@ -100,6 +126,12 @@ def document(
         ),
         summary(transfers, groups),
         Paragraph("Medians over the policies of an experiment, of their means."),
+        Heading("Latency"),
+        Paragraph(
+            "Kept in the worlds where commands reach the wheels so many control steps "
+            "late, mean over worlds and policies."
+        ),
+        by_latency(transfers, groups, latency),
     ]
     for robot, transfer in transfers.items():
         rows = [
