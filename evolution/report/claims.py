@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from evolution.comparisons import a12_interval, mann_whitney
+from evolution.report.words import probability
 from evolution.results import WHEELED_ROBOT
 from evolution.statistics import quartiles, wilson
 from evolution.study_data import StudyData
@@ -224,7 +225,10 @@ def following_share(test: dict) -> float:
 def _compared(a: np.ndarray, b: np.ndarray) -> tuple[str, str]:
     """How far the runs of `a` exceed those of `b`, and the verdict on that."""
     effect, p = a12_interval(a, b), mann_whitney(a, b).p
-    ours = f"A12 {effect.value:.2f} [{effect.low:.2f}, {effect.high:.2f}], p = {p:.3f}"
+    ours = (
+        f"A12 {effect.value:.2f} [{effect.low:.2f}, {effect.high:.2f}], "
+        f"p {probability(p)}"
+    )
     if p >= LEVEL:
         return ours, UNTESTED
     return ours, CONSISTENT if effect.value > 0.5 else INCONSISTENT

@@ -4,12 +4,16 @@ import math
 import shlex
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from evolution.comparisons import FEWEST_FOR_STARS, LEVELS
-from evolution.report.comparisons import PairRow
 from evolution.statistics import quartiles
+
+if TYPE_CHECKING:
+    # it counts on the claims, which are written in these words
+    from evolution.report.comparisons import PairRow
 
 NOTHING = "-"
 """Stands for what is not known."""
@@ -68,7 +72,7 @@ def command_line(module: str, *arguments: str) -> str:
     return shlex.join(["python", "-m", module, *arguments])
 
 
-def compared(row: PairRow, a: str, b: str) -> str:
+def compared(row: "PairRow", a: str, b: str) -> str:
     """What a pair of experiments shows, and no more; the better one comes first.
 
     Args:
@@ -99,7 +103,7 @@ def compared(row: PairRow, a: str, b: str) -> str:
     return f"{a} beats {b} in {row.a12:.0%} of the pairs of runs: {numbers}."
 
 
-def _turned(row: PairRow) -> PairRow:
+def _turned(row: "PairRow") -> "PairRow":
     """The same pair, the second experiment first."""
     return replace(
         row,
