@@ -22,7 +22,7 @@ from epuck_mj.model import Scene
 from epuck_mj.simulation import SimulatedRobots
 from epuck_mj.tasks import FollowWalls, environment
 
-CAPACITY = 256
+CAPACITY = 512
 """Robots simulated at once: changes no result. More of them leave the cache.
 
 An individual with more trials is not raced.

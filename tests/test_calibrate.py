@@ -256,10 +256,10 @@ class Person:
             self.mark(CENTRE)
         elif found := re.search(r"(\d+) mm of air", question):
             self.at_wall(int(found[1]) / 1000)
-        elif "metres" in question:
-            return str((self.front() - self.start_front)[0])
         elif "To the left" in question:
             return str(1000 * (self.front() - self.start_front)[1])
+        elif "in metres" in question:
+            return str((self.front() - self.start_front)[0])
         elif "above 0" in question:
             yaw = np.unwrap([pose[2] for pose in self.body.journal.pose[self.since :]])
             return f"{math.degrees(yaw[-1] - yaw[0]) - 3 * 360:.1f}"
@@ -609,7 +609,7 @@ def test_the_whole_command(tmp_path, output):
                 assert "residual" in said
                 break
     found = Calibration.load(output)
-    assert found.wheel_radii == pytest.approx(RADII, rel=0.01)
+    assert found.wheel_radii == pytest.approx(RADII, rel=0.005)
     assert found.track == pytest.approx(0.0562, rel=0.01)
     np.testing.assert_allclose(found.gains, GAINS, rtol=0.05)
 
