@@ -253,10 +253,11 @@ def _serve(folder: Path) -> None:
     write_page(folder)
     with server(folder) as web:
         address = f"http://{LOOPBACK}:{web.server_port}/"
-        print(f"{folder}, served at {address} until Ctrl-C", flush=True)
-        if display_there():
-            webbrowser.open(address)
         try:
+            # from the moment it is promised
+            print(f"{folder}, served at {address} until Ctrl-C", flush=True)
+            if display_there():
+                webbrowser.open(address)
             web.serve_forever()
         except KeyboardInterrupt:
             print()
