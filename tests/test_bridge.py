@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +25,8 @@ from epuck_mj.errors import UserError
 from epuck_mj.model import load_scene
 from epuck_mj.motors import STEP_ANGLE
 from epuck_mj.trajectory import Trajectory
-from tests.test_fake import PATIENCE, fake_process, living, wait_for
+from tests.processes import PATIENCE, python_process
+from tests.test_fake import fake_process, living, wait_for
 
 ROOT = Path(__file__).resolve().parent.parent
 CHAMPION = ROOT / "results" / "paper" / "de-best" / "seed-1" / "champion.json"
@@ -45,28 +45,14 @@ def port(tmp_path):
 
 def command(port, log, *arguments, champion: str | Path = "wall-follower"):
     return [
-        *(sys.executable, "-W", "error", "-m", "epuck_mj.bridge", str(champion)),
+        *("-W", "error", "-m", "epuck_mj.bridge", str(champion)),
         *("--port", str(port), "--log", str(log), *arguments),
     ]
 
 
-@contextmanager
 def started(port, log, *arguments, **options):
     """A bridge that is under way; killed if it hangs."""
-    process = subprocess.Popen(
-        command(port, log, *arguments),
-        stdin=options.pop("stdin", subprocess.DEVNULL),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        **options,
-    )
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
-            process.kill()
-        process.communicate(timeout=PATIENCE)
+    return python_process(*command(port, log, *arguments), **options)
 
 
 BUSY = "expected a reading every 300 ms"
@@ -86,7 +72,7 @@ def run(
     """
     for chance in (3, 2, 1):
         done = subprocess.run(
-            command(port, log, *arguments, champion=champion),
+            [sys.executable, *command(port, log, *arguments, champion=champion)],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,

@@ -7,7 +7,6 @@ import pty
 import re
 import signal
 import subprocess
-import sys
 import threading
 import time
 from contextlib import contextmanager
@@ -18,7 +17,7 @@ import pytest
 
 from epuck_mj.bridge.fake.body import MujocoBody
 from epuck_mj.bridge.fake.emulator import Emulator
-from epuck_mj.bridge.fake.endpoints import Pty, serve
+from epuck_mj.bridge.fake.endpoints import Pty
 from epuck_mj.bridge.fake.scenarios import scenario
 from epuck_mj.bridge.fake.virtual import VirtualPort, VirtualTime
 from epuck_mj.bridge.interruption import SIGNALS
@@ -50,8 +49,9 @@ from epuck_mj.model import MODELS, load_scene
 from epuck_mj.motors import STEP_ANGLE
 from epuck_mj.sensors import counted, proximity
 from epuck_mj.simulation import SimulatedRobots
+from tests.processes import PATIENCE, python_process
 from tests.test_bridge import BUSY
-from tests.test_fake import PATIENCE, living, wait_for
+from tests.test_fake import behind, living, wait_for
 
 GAINS = np.array([0.62, 1.45, 0.9, 1.1, 0.75, 1.3, 1.0, 1.2])
 RADII = (0.01995, 0.02025)
@@ -543,41 +543,17 @@ def clock():
 
 @contextmanager
 def own_robot(endpoint, scene):
-    """A robot of its own behind an endpoint, faster than real, in a thread of ours."""
+    """A robot of its own behind an endpoint, faster than real."""
     body = Body(scene, np.zeros(3), clock())
     body.gains, body.offset = GAINS, 40
-    emulator = Emulator(body, "asercom", clock())
-    end = threading.Event()
-    arguments = (emulator, endpoint, clock, lambda: not end.is_set())
-    thread = threading.Thread(target=serve, args=arguments)
-    thread.start()
-    try:
+    with behind(endpoint, Emulator(body, "asercom", clock()), clock):
         yield body
-    finally:
-        end.set()
-        thread.join(PATIENCE)
-        assert not thread.is_alive()
 
 
-@contextmanager
 def started(port, *arguments, stdin=subprocess.PIPE):
     """A calibration that is under way; killed if it hangs."""
-    process = subprocess.Popen(
-        [
-            *(sys.executable, "-W", "error", "-m", "epuck_mj.calibrate"),
-            *("--port", str(port), *arguments),
-        ],
-        stdin=stdin,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
-            process.kill()
-        process.communicate(timeout=PATIENCE)
+    module = ("-W", "error", "-m", "epuck_mj.calibrate")
+    return python_process(*module, "--port", str(port), *arguments, stdin=stdin)
 
 
 def answered(process, person):

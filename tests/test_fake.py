@@ -4,11 +4,10 @@ import math
 import os
 import signal
 import subprocess
-import sys
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -28,27 +27,19 @@ from epuck_mj.errors import UserError
 from epuck_mj.files import read_arrays
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.motors import STEP_ANGLE
-
-PATIENCE = 60.0
-"""Whatever takes longer [s] hangs, on however busy a machine."""
+from tests.processes import PATIENCE, python_process
 
 
 @contextmanager
-def living(
+def behind(
     endpoint: Endpoint,
-    scene: Scene,
-    start=(0.0, 0.0, 0.0),
-    robot="asercom",
-    faults="",
+    emulator: Emulator,
+    clock: Callable[[], float] = time.monotonic,
 ) -> Iterator[Emulator]:
-    """An emulated robot behind an endpoint, in real time, in a thread of ours."""
-    body = MujocoBody(scene, np.array(start, float), time.monotonic())
-    emulator = Emulator(body, robot, time.monotonic(), scenario(faults))
+    """An emulated robot behind an endpoint, in a thread of ours."""
     end = threading.Event()
-    thread = threading.Thread(
-        target=serve,
-        args=(emulator, endpoint, time.monotonic, lambda: not end.is_set()),
-    )
+    arguments = (emulator, endpoint, clock, lambda: not end.is_set())
+    thread = threading.Thread(target=serve, args=arguments)
     thread.start()
     try:
         yield emulator
@@ -56,6 +47,19 @@ def living(
         end.set()
         thread.join(PATIENCE)
         assert not thread.is_alive()
+
+
+def living(
+    endpoint: Endpoint,
+    scene: Scene,
+    start=(0.0, 0.0, 0.0),
+    robot="asercom",
+    faults="",
+) -> AbstractContextManager[Emulator]:
+    """An emulated robot behind an endpoint, in real time."""
+    body = MujocoBody(scene, np.array(start, float), time.monotonic())
+    emulator = Emulator(body, robot, time.monotonic(), scenario(faults))
+    return behind(endpoint, emulator)
 
 
 def wait_for(condition, what: str) -> None:
@@ -241,28 +245,20 @@ def test_bad_input(arguments, message):
 @contextmanager
 def fake_process(*arguments: str) -> Iterator[tuple[subprocess.Popen, str]]:
     """An emulated robot as a process of its own, and the name of its port."""
-    process = subprocess.Popen(
-        [sys.executable, "-W", "error", "-m", "epuck_mj.bridge.fake", *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    watch = threading.Timer(PATIENCE, process.kill)
-    watch.start()
-    try:
-        assert process.stdout is not None
-        name = ""
-        while not name:
-            line = process.stdout.readline()
-            assert line, process.communicate(timeout=PATIENCE)
-            name = line.removeprefix("port: ").strip() if "port: " in line else ""
-        watch.cancel()
+    module = ("-W", "error", "-m", "epuck_mj.bridge.fake")
+    with python_process(*module, *arguments) as process:
+        watch = threading.Timer(PATIENCE, process.kill)
+        watch.start()
+        try:
+            assert process.stdout is not None
+            name = ""
+            while not name:
+                line = process.stdout.readline()
+                assert line, process.communicate(timeout=PATIENCE)
+                name = line.removeprefix("port: ").strip() if "port: " in line else ""
+        finally:
+            watch.cancel()
         yield process, name
-    finally:
-        watch.cancel()
-        if process.poll() is None:
-            process.kill()
-        process.communicate(timeout=PATIENCE)
 
 
 @pytest.mark.slow

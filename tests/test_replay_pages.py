@@ -19,6 +19,7 @@ from benchmarks.viewer_picture import picture, viewer
 from epuck_mj.errors import UserError
 from evolution.replay.command import replay
 from tests.browser import MISSING, browser, until
+from tests.processes import python_process
 
 ROOT = Path(__file__).parent.parent
 CHAMPION = ROOT / "results/paper/de-best/seed-1/champion.json"
@@ -119,14 +120,8 @@ def test_every_view_shows_something_and_reports_nothing(here, trials, monkeypatc
 @contextmanager
 def served(*argv: str) -> Iterator[tuple[subprocess.Popen, str]]:
     """A process that serves a page, and the address that it says."""
-    process = subprocess.Popen(
-        [sys.executable, "-W", "error", "-m", "evolution.replay", *argv],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
+    module = ("-W", "error", "-m", "evolution.replay")
+    with python_process(*module, *argv) as process:
         assert process.stdout is not None
         for line in process.stdout:
             found = re.search(r"served at (http://\S+/) until Ctrl-C$", line.rstrip())
@@ -135,9 +130,6 @@ def served(*argv: str) -> Iterator[tuple[subprocess.Popen, str]]:
                 break
         else:
             pytest.fail(f"it serves nothing: {process.communicate()[1]}")
-    finally:
-        process.kill()
-        process.communicate()
 
 
 def listeners(port: int) -> set[str]:

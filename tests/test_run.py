@@ -13,8 +13,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +34,7 @@ from evolution.held_out import Judge
 from evolution.optimizer import OPTIMIZERS
 from evolution.run import run
 from evolution.run_directory import LOCK
+from tests.processes import python_process
 
 TIMEOUT = 120
 """Seconds for what takes a few on a machine that does nothing else."""
@@ -65,28 +65,10 @@ REPRODUCED = ("history.csv", "champion.json")
 # processes
 
 
-@contextmanager
-def started(cwd: Path, *command: str, **variables) -> Iterator[subprocess.Popen[str]]:
-    """A python process, which does not outlive the block."""
-    process = subprocess.Popen(
-        [sys.executable, *command],
-        cwd=cwd,
-        env=os.environ | variables,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.communicate()
-
-
 def evolution(cwd: Path, *argv: str, **variables) -> subprocess.CompletedProcess[str]:
     """The finished process of a command line."""
-    with started(cwd, "-m", "evolution.run", *argv, **variables) as process:
+    command = ("-m", "evolution.run", *argv)
+    with python_process(*command, cwd=cwd, env=os.environ | variables) as process:
         stdout, stderr = process.communicate(timeout=TIMEOUT)
     return subprocess.CompletedProcess(argv, process.returncode, stdout, stderr)
 
@@ -710,7 +692,7 @@ def test_a_signal_ends_the_run_and_says_how_to_resume(
 ):
     argv = ["ga", "--seed", "7", *LONG, "--output", "some where"]
     directory = tmp_path / "some where"
-    with started(tmp_path, "-c", UNHURRIED, *argv) as process:
+    with python_process("-c", UNHURRIED, *argv, cwd=tmp_path) as process:
         wait_for(process, lambda: n_rows(directory) >= generations)
         process.send_signal(signum)
         stdout, stderr = process.communicate(timeout=TIMEOUT)
@@ -745,7 +727,7 @@ def test_kill_9_at_any_moment_loses_at_most_one_generation(reference, tmp_path):
         lambda: n_records(directory) == LONG_GENERATIONS,
     ]
     for moment in moments:
-        with started(tmp_path, "-c", UNHURRIED, *argv) as process:
+        with python_process("-c", UNHURRIED, *argv, cwd=tmp_path) as process:
             wait_for(process, moment)
             time.sleep(random.uniform(0, 0.2))
             process.kill()
@@ -882,7 +864,7 @@ main(late)
 def test_a_second_ctrl_c_changes_nothing(moment, tmp_path):
     code = TWICE.replace("MOMENT", repr(moment))
     argv = ["ga", *TINY, "--output", "run"]
-    with started(tmp_path, "-c", code, *argv) as process:
+    with python_process("-c", code, *argv, cwd=tmp_path) as process:
         _, stderr = process.communicate(timeout=TIMEOUT)
     assert process.returncode == 130
     assert resume_command(stderr) == ["--resume", "run"]

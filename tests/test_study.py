@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -27,6 +27,7 @@ from evolution.jobs import Event, Job, carry_out, failure_log, failure_of
 from evolution.run import run
 from evolution.run_directory import LOCK, RunDirectory
 from evolution.study import study
+from tests.processes import python_process
 
 TIMEOUT = 120
 """Seconds for what takes a few on a machine that does nothing else."""
@@ -51,6 +52,7 @@ import math, time
 from epuck_mj.command_line import main
 from evolution import champion, execution, results, run_directory, study
 from evolution.held_out import Judge
+from tests.processes import python_process
 
 # in the processes of the runs as well, which import this file
 test, save = Judge.test, run_directory.RunDirectory.save
@@ -149,28 +151,8 @@ def carried(monkeypatch) -> Carried:
 # processes
 
 
-@contextmanager
-def started(cwd: Path, *command: str) -> Iterator[subprocess.Popen[str]]:
-    """A python process; neither it nor its children outlive the block."""
-    process = subprocess.Popen(
-        [sys.executable, *command],
-        cwd=cwd,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    try:
-        yield process
-    finally:
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
-
-
 def finish(cwd: Path, *command: str) -> subprocess.CompletedProcess[str]:
-    with started(cwd, *command) as process:
+    with python_process(*command, cwd=cwd) as process:
         stdout, stderr = process.communicate(timeout=TIMEOUT)
     return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
 
@@ -422,7 +404,7 @@ def test_a_run_killed_alone_is_reported_and_the_next_call_completes_it(
     write_study(here, evaluations=LONG)
     argv = ["mine.yaml", "--experiments", "one", "--seeds", "1-2", "--output", "out"]
     one, two = (here / "out" / "one" / f"seed-{seed}" for seed in SEEDS)
-    with started(here, "unhurried.py", *argv, "--jobs", "1") as process:
+    with python_process("unhurried.py", *argv, "--jobs", "1", cwd=here) as process:
         wait_for(lambda: n_records(one) > 2)
         (victim,) = run_processes(process.pid)
         os.kill(victim, signal.SIGKILL)
@@ -458,7 +440,7 @@ def interrupted(
     argv = ["mine.yaml", "--experiments", "one", "--output", "out"]
     argv += ["--seeds", ",".join(map(str, seeds)), "--jobs", "2"]
     directories = [here / "out" / "one" / f"seed-{seed}" for seed in seeds]
-    with started(here, "unhurried.py", *argv) as process:
+    with python_process("unhurried.py", *argv, cwd=here) as process:
         wait_for(lambda: all(n_records(each) > 1 for each in directories))
         children = run_processes(process.pid)
         assert len(children) == len(seeds)
@@ -533,7 +515,8 @@ with FileLock(sys.argv[1]):
 @contextmanager
 def held(directory: Path, seconds: float = TIMEOUT) -> Iterator[subprocess.Popen[str]]:
     """Another process works in the directory for so long."""
-    with started(directory, "-c", HOLD, str(directory / LOCK), str(seconds)) as process:
+    arguments = (str(directory / LOCK), str(seconds))
+    with python_process("-c", HOLD, *arguments, cwd=directory) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "held\n"
         yield process
