@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.bridge import at_control_steps
 from epuck_mj.bridge.body import wrapped
 from epuck_mj.bridge.builds import BUILDS
 from epuck_mj.bridge.connection import Greeting
@@ -344,14 +345,7 @@ def test_the_loop_is_the_plain_simulations_on_the_plane(planar):
     start = np.array([0.1, -0.2, 0.7])
     world = World(planar, start)
     world.drive(600)
-    first = next(
-        step
-        for step, row in zip(
-            world.body.journal.command_step, world.body.journal.command, strict=True
-        )
-        if row[0]
-    )
-    poses = np.array(world.body.journal.pose)[first :: planar.n_substeps][:601]
+    poses = at_control_steps(planar, world.body.journal, 600)
     plain = nominal(planar, WallFollower(), TASK, start, 600)[: len(poses)]
     moved, turned = deviation(plain, poses)
     assert len(poses) == 601

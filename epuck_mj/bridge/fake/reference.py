@@ -14,12 +14,16 @@ import numpy as np
 
 from epuck_mj.bridge.body import MotorTimer, Wheel
 from epuck_mj.bridge.fake.body import Journal
-from epuck_mj.calibration import Calibration
-from epuck_mj.control import Policy, TaskParameters
+from epuck_mj.control import Policy, TaskParameters, control_step
+from epuck_mj.disturbances import Noise, draw
+from epuck_mj.disturbed_robots import DisturbedRobots
 from epuck_mj.model import Scene
-from epuck_mj.motors import STEP_ANGLE, actual_rates, command, step_rates
+from epuck_mj.motors import STEP_ANGLE, command, step_rates
 from epuck_mj.sensors import observe, proximity, sensed_distance
 from epuck_mj.simulation import SimulatedRobots
+
+QUIET = Noise(counts=0.0, wheels=0.0, age=0.0)
+"""Whole counts and whole steps, and nothing else."""
 
 
 def same_times(
@@ -89,7 +93,6 @@ def nominal(
     task: TaskParameters,
     start: np.ndarray,
     n_steps: int,
-    calibration: Calibration | None = None,
 ) -> np.ndarray:
     """Poses `(n_steps + 1, 3)` at the ends of control steps that nothing disturbs.
 
@@ -99,17 +102,13 @@ def nominal(
         task: what the robot is at.
         start: pose `(3,)`: x, y [m], yaw [rad].
         n_steps: control steps.
-        calibration: in what the robot differs from the robot of the books.
     """
-    gains = (calibration or Calibration()).gains
-    robots = SimulatedRobots(scene, 1, 1)
-    reading = robots.reset(start[None])
+    met = draw(np.random.default_rng(0), 1, n_steps, QUIET)
+    robots = DisturbedRobots(SimulatedRobots(scene, 1, 1), met, task.control_step)
+    observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     poses = [robots.poses()[0]]
     for _ in range(n_steps):
-        counts = np.rint(proximity(reading.distance[0], gains))
-        observation = observe(sensed_distance(counts, gains), task.sensor_range)
-        rates = actual_rates(step_rates(command(policy(observation), task.speeds)))
-        reading = robots.step(rates[None] * STEP_ANGLE)
+        observation = control_step(robots, policy, observation, task).observation
         poses.append(robots.poses()[0])
     return np.array(poses)
 
