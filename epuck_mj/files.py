@@ -82,8 +82,12 @@ def check_writable(path: Path) -> None:
         raise UserError(f"cannot write '{path}': it is a folder")
     if not is_directory(path.parent):
         raise UserError(f"cannot write '{path}': no folder '{path.parent}'")
-    if not os.access(path.parent, os.W_OK):
-        raise UserError(f"cannot write '{path}': permission denied")
+    try:
+        handle, probe = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+    except OSError as error:
+        raise UserError(f"cannot write '{path}': {error.strerror}") from None
+    os.close(handle)
+    Path(probe).unlink()
 
 
 def leftovers(folder: Path) -> list[Path]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from epuck_mj.bridge.session import Session
 from epuck_mj.control import Policy
 from epuck_mj.errors import UserError
-from epuck_mj.files import write_bytes, writing
+from epuck_mj.files import check_writable, writing
 from epuck_mj.model import Scene
 from epuck_mj.recording import Trial, save_recording
 
@@ -28,10 +28,8 @@ def log_name(name: Path | None) -> Path:
         name = name.with_suffix("")
     with writing(name.parent):
         name.parent.mkdir(parents=True, exist_ok=True)
-        # better now than when the robot has driven
-        probe = name.with_name(f".{name.name}.probe")
-        write_bytes(probe, b"")
-        probe.unlink()
+    for path in _files(name):
+        check_writable(path)
     return name
 
 
@@ -53,8 +51,7 @@ def save_log(
     trajectory = session.trajectory(policy)
     if trajectory is None:
         return []
-    # names may have dots of their own
-    arrays, recording = (name.with_name(name.name + end) for end in (".npz", ".rrd"))
+    arrays, recording = _files(name)
     trajectory.save(arrays)
     if not trajectory.steps:
         return [arrays]
@@ -64,3 +61,8 @@ def save_log(
     except UserError as error:
         raise UserError(f"{error}; '{arrays}' was written") from None
     return [arrays, recording]
+
+
+def _files(name: Path) -> tuple[Path, Path]:
+    """Of a log: the trajectory and the recording; names may have dots of their own."""
+    return name.with_name(f"{name.name}.npz"), name.with_name(f"{name.name}.rrd")
