@@ -40,9 +40,8 @@ def publish(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
     parse(Options, "python -m benchmarks.publish", argv, Options())
     for name in (*REPORTED, TRANSFER):
-        source = Path("runs") / name
-        if any(source.glob("*/seed-*/champion.json")):
-            ship(source, Path("results") / name)
+        if (Path("runs") / name).is_dir():
+            ship(Path("runs") / name, Path("results") / name)
     paper, *others = (str(path) for path in shipped(Path("results")))
     wheels = [argument for path in others for argument in ("--wheels", path)]
     reproduce(["--study", paper, *wheels, "--output", "results"])
@@ -61,15 +60,18 @@ def shipped(results: Path) -> list[Path]:
 
 
 def ship(source: Path, target: Path) -> None:
-    """Copy the study and its finished runs, without what can be made anew."""
+    """Copy the study and its finished runs, if any, without what can be made anew."""
     study, copies = StudyDirectory(source), StudyDirectory(target)
     names = study.stored_config().experiments
-    pairs = [(study.config, copies.config), (study.yardstick, copies.yardstick)]
+    pairs: list[tuple[Path, Path]] = []
     for name in names:
         for seed in study.seeds(name):
             run, copy = study.run(name, seed), copies.run(name, seed)
             if run.finished:
                 pairs += zip(_kept(run), _kept(copy), strict=True)
+    if pairs:
+        pairs.append((study.config, copies.config))
+        pairs.append((study.yardstick, copies.yardstick))
     for path, copy in pairs:
         if path.exists():
             copy.parent.mkdir(parents=True, exist_ok=True)

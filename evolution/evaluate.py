@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 
 import tyro
@@ -10,6 +11,7 @@ import tyro
 from epuck_mj import files
 from epuck_mj.calibration import Calibration
 from epuck_mj.command_line import check_threads, main, parse
+from epuck_mj.disturbances import Disturbances
 from epuck_mj.errors import UserError
 from epuck_mj.model import load_scene
 from evolution.champion import HELD_OUT_SEED, N_TEST
@@ -81,6 +83,12 @@ def evaluate(argv: Sequence[str]) -> int:
     if options.json is not None:
         files.check_writable(options.json)
     judges: dict[tuple, Judge] = {}
+
+    @cache
+    def met(steps: int) -> Disturbances | None:
+        key = (HELD_OUT_SEED, Purpose.TEST)
+        return disturbances(conditions, options.starts, steps, *key)
+
     tests = []
     for candidate in candidates:
         other = PLANAR_ROBOT if candidate.robot == WHEELED_ROBOT else WHEELED_ROBOT
@@ -93,16 +101,10 @@ def evaluate(argv: Sequence[str]) -> int:
                 judges[key] = Judge(
                     scene, candidate.task, candidate.start_clearance, options.threads
                 )
-            met = disturbances(
-                conditions,
-                options.starts,
-                candidate.task.steps,
-                HELD_OUT_SEED,
-                Purpose.TEST,
-            )
-            test = judges[key].test(candidate.policy, options.starts, met)
+            steps = candidate.task.steps
+            test = judges[key].test(candidate.policy, options.starts, met(steps))
             print(f"{candidate.name}, {Path(robot).name} in {Path(arena).name}")
-            print(_described(test, candidate.task.steps), flush=True)
+            print(_described(test, steps), flush=True)
             where = {
                 "name": candidate.name,
                 "robot": robot,

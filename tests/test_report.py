@@ -31,11 +31,12 @@ from evolution.report.blocks import (
 )
 from evolution.report.command import report, tables
 from evolution.report.comparisons import BEATS, FOLLOWS, pair_rows, success_rows
+from evolution.report.contests import compared
 from evolution.report.figures.curves import TARGET_SHARES
 from evolution.report.samples import rank_correlation
 from evolution.report.summary import summary, summary_text
 from evolution.report.tables import csv_text, run_rows, target_rows
-from evolution.report.words import compared, seeds_text, spread
+from evolution.report.words import seeds_text, spread
 from evolution.study_data import load_study
 from tests.study_on_disk import LEVELS, history, write_study
 

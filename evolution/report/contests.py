@@ -1,7 +1,9 @@
 """The contests of a report: experiments against each other and against targets."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+from evolution.comparisons import FEWEST_FOR_STARS, LEVELS
 from evolution.report.blocks import Block, Heading, Listing, Paragraph, Table
 from evolution.report.claims import FOLLOWING
 from evolution.report.comparisons import (
@@ -20,7 +22,7 @@ from evolution.report.tables import (
     shown_robots,
     target_rows,
 )
-from evolution.report.words import between, compared, evaluations, probability
+from evolution.report.words import between, evaluations, probability
 from evolution.study_data import StudyData
 
 
@@ -161,3 +163,54 @@ def targets(data: StudyData) -> list[Block]:
 
 def _cost(row: TargetRow) -> str:
     return f"{evaluations(row.expected_running_time)} ({row.hits}/{row.n})"
+
+
+def compared(row: PairRow, a: str, b: str) -> str:
+    """What a pair of experiments shows, and no more; the better one comes first.
+
+    Args:
+        row: the pair.
+        a: name of the first for readers.
+        b: name of the second.
+    """
+    if row.a12 < 0.5:
+        row, a, b = _turned(row), b, a
+    numbers = (
+        f"medians {row.median_a:.1f} and {row.median_b:.1f}, difference "
+        f"{row.median_difference:.1f} "
+        + between(row.median_difference_low, row.median_difference_high, ".1f")
+        + f"; A12 {row.a12:.2f} {between(row.a12_low, row.a12_high)}; "
+        f"p {probability(row.p)}, Holm {probability(row.p_holm)}; "
+        f"n = {row.n_a} and {row.n_b}"
+    )
+    if min(row.n_a, row.n_b) < FEWEST_FOR_STARS:
+        return (
+            f"{a} and {b}: {numbers}. Fewer than {FEWEST_FOR_STARS} runs: "
+            "no verdict on which is better."
+        )
+    if row.p_holm >= LEVELS[0]:
+        return (
+            f"{a} and {b}: no difference is shown, which does not show that there is "
+            f"none: {numbers}."
+        )
+    return f"{a} beats {b} in {row.a12:.0%} of the pairs of runs: {numbers}."
+
+
+def _turned(row: PairRow) -> PairRow:
+    """The same pair, the second experiment first."""
+    return replace(
+        row,
+        a=row.b,
+        b=row.a,
+        n_a=row.n_b,
+        n_b=row.n_a,
+        median_a=row.median_b,
+        median_b=row.median_a,
+        u=row.n_a * row.n_b - row.u,
+        a12=1 - row.a12,
+        a12_low=1 - row.a12_high,
+        a12_high=1 - row.a12_low,
+        median_difference=-row.median_difference,
+        median_difference_low=-row.median_difference_high,
+        median_difference_high=-row.median_difference_low,
+    )
