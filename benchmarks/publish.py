@@ -71,6 +71,7 @@ def ship(source: Path, target: Path) -> None:
                 pairs += zip(_kept(run), _kept(copy), strict=True)
     if pairs:
         pairs.append((study.config, copies.config))
+        pairs.append((study.asked, copies.asked))
         pairs.append((study.yardstick, copies.yardstick))
     for path, copy in pairs:
         if path.exists():

@@ -21,8 +21,8 @@ from epuck_mj.recording import Trial, save_recording
 from epuck_mj.starts import FreeSpace
 from epuck_mj.trajectory import record
 from evolution.champion import starts_for_test
+from evolution.held_out import WHEELED_ROBOT
 from evolution.named_policies import named_policies
-from evolution.results import WHEELED_ROBOT
 
 RUN = "results/paper/de-best/seed-1"
 MANY = 10

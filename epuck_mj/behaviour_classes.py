@@ -10,8 +10,14 @@ from types import MappingProxyType
 
 import numpy as np
 
-from epuck_mj.constants import BODY_RADIUS
-from epuck_mj.metrics import FOLLOWING_TIME, Behaviour
+from epuck_mj.constants import BODY_RADIUS, PROXIMITY_RANGE
+from epuck_mj.metrics import (
+    FOLLOWING_SHARE,
+    FOLLOWING_SPEED,
+    FOLLOWING_TIME,
+    LAST_TIME,
+    Behaviour,
+)
 
 SPOT = BODY_RADIUS
 """Farthest that a robot on the spot gets [m]: it still stands where it stood."""
@@ -54,6 +60,23 @@ CLASSES: MappingProxyType[str, Callable[[Behaviour], np.ndarray]] = MappingProxy
     }
 )
 """Name and predicate of each class, in order of precedence; `other` fits the rest."""
+
+MEANINGS: MappingProxyType[str, str] = MappingProxyType(
+    {
+        "crashed": "the shell touched a wall, whatever went before",
+        "spinner": f"turned on one spot of {SPOT * 1000:.0f} mm all its life",
+        "stuck": f"stayed on such a spot for its last {LAST_TIME:.0f} s",
+        "hugger": f"a wall follower with a mean clearance below {HUG * 1000:.0f} mm",
+        "wall follower": f"within {PROXIMITY_RANGE * 1000:.0f} mm of walls in "
+        f"{FOLLOWING_SHARE:.0%} of the time from the first on, {FOLLOWING_TIME:.0f} s "
+        f"at least, making way along them at {FOLLOWING_SPEED:.0%} of the top speed",
+        "circler": "went round in the open, which walls only touch",
+        "bouncer": f"from wall to wall, {BOUNCES} visits at least",
+        "searcher": "met no wall, or too late to tell what it does there",
+        OTHER: "none of these",
+    }
+)
+"""The same in words, for readers."""
 
 
 def behaviour_classes(behaviour: Behaviour) -> np.ndarray:

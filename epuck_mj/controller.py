@@ -29,6 +29,17 @@ class Network:
     hidden: int = 4
     biases: bool = False
 
+    def __post_init__(self) -> None:
+        """Refuse what is no shape: files say anything.
+
+        Raises:
+            ValueError: if it is none.
+        """
+        if type(self.hidden) is not int or self.hidden < 1:
+            raise ValueError(f"expected hidden neurons, 1 or more, got {self.hidden!r}")
+        if type(self.biases) is not bool:
+            raise ValueError(f"expected biases true or false, got {self.biases!r}")
+
     @property
     def n_genes(self) -> int:
         """Number of weights: 40 for the paper's 8-4-2 without biases."""

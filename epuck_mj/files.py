@@ -13,10 +13,13 @@ import numpy as np
 
 from epuck_mj.errors import UserError
 
+TEMPORARY = ".tmp"
+"""End of the names of files that are being written."""
+
 
 def write_bytes(path: Path, content: bytes) -> None:
     """Replace `path` by `content`; whoever reads sees the old file or the new."""
-    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+    handle, temporary = _temporary(path)
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
@@ -83,7 +86,7 @@ def check_writable(path: Path) -> None:
     if not is_directory(path.parent):
         raise UserError(f"cannot write '{path}': no folder '{path.parent}'")
     try:
-        handle, probe = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+        handle, probe = _temporary(path)
     except OSError as error:
         raise UserError(f"cannot write '{path}': {error.strerror}") from None
     os.close(handle)
@@ -92,7 +95,7 @@ def check_writable(path: Path) -> None:
 
 def leftovers(folder: Path) -> list[Path]:
     """Temporary files of writers that were killed."""
-    return list(folder.glob(".*-????????"))
+    return list(folder.glob(f".*-????????{TEMPORARY}"))
 
 
 def remove_leftovers(folder: Path) -> None:
@@ -133,6 +136,11 @@ DAMAGED = (
     TokenError,
 )
 """What numpy and zipfile raise for damaged archives."""
+
+
+def _temporary(path: Path) -> tuple[int, str]:
+    """A new file beside `path`, open and by name."""
+    return tempfile.mkstemp(TEMPORARY, f".{path.name}-", path.parent)
 
 
 def _umask() -> int:

@@ -166,15 +166,18 @@ def with_robot(arena: Path, robot: Path) -> tuple[str, dict[str, bytes]]:
     """The arena's text and the files it includes, the robot among them replaced.
 
     Raises:
-        UserError: if a file is missing or no XML, or the arena is a robot itself.
+        UserError: if a file is missing or no XML, includes what MuJoCo would not find,
+            or the arena is a robot itself.
     """
     text = _read(arena)
     files, found = {}, False
+    _refuse_includes(robot)
     for name in _includes(text, arena):
         path = arena.parent / name
         # a copied arena may name a robot that it left behind
         if path.name in SHIPPED_ROBOTS or _has_robot(_read(path), path):
             found, path = True, robot
+        _refuse_includes(path)
         files[name] = _read(path).encode()
     if found:
         return text, files
@@ -205,6 +208,16 @@ def _parse(text: str, path: Path) -> ET.Element:
 
 def _includes(text: str, path: Path) -> list[str]:
     return [e.get("file", "") for e in _parse(text, path).iter("include")]
+
+
+def _refuse_includes(path: Path) -> None:
+    """Refuse a file to be included that includes others: nobody would hash those."""
+    inner = _includes(_read(path), path)
+    if inner:
+        raise UserError(
+            f"'{path}' includes '{inner[0]}': an included file cannot include others, "
+            "nor can a robot; expected it in the arena"
+        )
 
 
 def _has_robot(text: str, path: Path) -> bool:

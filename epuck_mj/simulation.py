@@ -69,7 +69,7 @@ class SimulatedRobots:
         return self._reading()
 
     def embody(self, mass: np.ndarray, friction: np.ndarray) -> None:
-        """Give the robots of the next reset bodies of their own.
+        """Give the robots bodies of their own, from the next reset on.
 
         Their wheels may turn faster than a firmware would ask for: larger ones do.
 

@@ -229,8 +229,10 @@ def run(argv: Sequence[str]) -> int:
         task = replace(task, steps=round(ratio))
     scene = load_scene(options.robot, options.arena, task.control_step)
     starts = _starts(scene, options)
-    robot = WatchedRobot(scene)
-    robot.reset(next(starts))
+    robot, first = WatchedRobot(scene), next(starts)
+    # the window shows it before the first trial begins
+    robot.reset(first)
+    starts = itertools.chain([first], starts)
     with open_window(scene.model, robot.data) as window:
         with window.lock():
             # rays go on for ever; controllers see four centimetres of them
@@ -246,6 +248,8 @@ def _starts(scene: Scene, options: Options) -> Iterator[np.ndarray]:
     Raises:
         UserError: if the arena has no room, or the pose is not one.
     """
+    if options.seed < 0:
+        raise UserError(f"expected --seed of 0 or more, got {options.seed}")
     if options.pose is not None:
         pose = np.array(options.pose)
         if not np.isfinite(pose).all():

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from epuck_mj.disturbances import Disturbances
 from epuck_mj.starts import FreeSpace
+from evolution.config import ExperimentConfig
 from evolution.evaluation import Engine, evaluate
 from evolution.experiment import Experiment, Purpose, disturbances, random_generator
 
@@ -35,6 +37,14 @@ def starts_for_validation(space: FreeSpace) -> np.ndarray:
 def starts_for_test(space: FreeSpace, n: int = N_TEST) -> np.ndarray:
     """The first `n` of the starts on which champions are reported, `(n, 3)`."""
     return space.sample(random_generator(HELD_OUT_SEED, Purpose.TEST), n)
+
+
+def held_out_disturbances(
+    config: ExperimentConfig, purpose: Purpose, n: int
+) -> Disturbances | None:
+    """What champions of an experiment meet in their first `n` trials of a purpose."""
+    conditions, steps = config.conditions, config.steps
+    return disturbances(conditions, n, steps, HELD_OUT_SEED, purpose)
 
 
 @dataclass(frozen=True)
@@ -87,8 +97,7 @@ def choose_champion(engine: Engine, experiment: Experiment) -> Champion:
     starts = starts_for_validation(experiment.space)
     network = experiment.config.network
     # as it was evolved: robots that are disturbed alike
-    config, key = experiment.config, (HELD_OUT_SEED, Purpose.VALIDATION)
-    met = disturbances(config.conditions, len(starts), config.steps, *key)
+    met = held_out_disturbances(experiment.config, Purpose.VALIDATION, len(starts))
     fitness = evaluate(engine, network, genomes, starts, disturbances=met).fitness
     best = int(fitness.argmax())
     return Champion(genomes[best], float(stored[best]), float(fitness[best]))

@@ -12,7 +12,13 @@ from typing import Any
 import numpy as np
 from scipy import optimize, stats
 
-from evolution.statistics import Interval, bootstrap, check_successes, checked
+from evolution.statistics import (
+    FEWEST_FOR_INTERVAL,
+    Interval,
+    bootstrap,
+    check_successes,
+    checked,
+)
 
 EXACT = 50
 """Largest sample of which the Mann-Whitney test is exact; takes milliseconds."""
@@ -148,11 +154,12 @@ def median_difference(
 ) -> Interval:
     """Median of `(n,)` minus median of `(m,)`, with a percentile bootstrap.
 
-    Percentile, since a median moves in steps: BCa's jackknife fails on it.
+    Percentile, since a median moves in steps: BCa's jackknife fails on it. Covers 92 to
+    98 % from 5 runs on; of fewer there are no bounds.
     """
     a, b = checked(a), checked(b)
     value = float(np.median(a) - np.median(b))
-    if min(a.size, b.size) < 2:
+    if min(a.size, b.size) < FEWEST_FOR_INTERVAL:
         return Interval(value, math.nan, math.nan)
 
     def difference(a: np.ndarray, b: np.ndarray, axis: int) -> np.ndarray:

@@ -13,14 +13,12 @@ from epuck_mj.calibration import Calibration
 from epuck_mj.command_line import check_threads, main, parse
 from epuck_mj.disturbances import Disturbances
 from epuck_mj.errors import UserError
-from epuck_mj.model import load_scene
 from evolution.champion import HELD_OUT_SEED, N_TEST
 from evolution.conditions import Conditions
 from evolution.config import NoiseLevel
 from evolution.experiment import Purpose, disturbances
-from evolution.held_out import HeldOut, Judge
+from evolution.held_out import HeldOut, judging, tested_on
 from evolution.named_policies import named_policies
-from evolution.results import PLANAR_ROBOT, WHEELED_ROBOT
 from evolution.study_data import YARDSTICK
 
 MODULE = "evolution.evaluate"
@@ -82,7 +80,7 @@ def evaluate(argv: Sequence[str]) -> int:
     conditions = _conditions(options)
     if options.json is not None:
         files.check_writable(options.json)
-    judges: dict[tuple, Judge] = {}
+    judge = judging(options.threads)
 
     @cache
     def met(steps: int) -> Disturbances | None:
@@ -91,18 +89,14 @@ def evaluate(argv: Sequence[str]) -> int:
 
     tests = []
     for candidate in candidates:
-        other = PLANAR_ROBOT if candidate.robot == WHEELED_ROBOT else WHEELED_ROBOT
-        robots = [options.robot] if options.robot else [candidate.robot, other]
+        robots = [options.robot] if options.robot else tested_on(candidate.robot)
         arena = options.arena or candidate.arena
-        for robot in dict.fromkeys(robots):
-            key = (robot, arena, candidate.task, candidate.start_clearance)
-            if key not in judges:
-                scene = load_scene(robot, arena, candidate.task.control_step)
-                judges[key] = Judge(
-                    scene, candidate.task, candidate.start_clearance, options.threads
-                )
+        world = arena, candidate.task, candidate.start_clearance
+        for robot in robots:
             steps = candidate.task.steps
-            test = judges[key].test(candidate.policy, options.starts, met(steps))
+            test = judge(robot, *world).test(
+                candidate.policy, options.starts, met(steps)
+            )
             print(f"{candidate.name}, {Path(robot).name} in {Path(arena).name}")
             print(_described(test, steps), flush=True)
             where = {

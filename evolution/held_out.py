@@ -3,8 +3,9 @@
 The numbers that a study reports.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Self
 
 import numpy as np
@@ -14,7 +15,7 @@ from epuck_mj.clearance import ClearanceProbe
 from epuck_mj.control import Policy, TaskParameters
 from epuck_mj.disturbances import Disturbances
 from epuck_mj.metrics import behaviour
-from epuck_mj.model import Scene
+from epuck_mj.model import Scene, load_scene
 from epuck_mj.simulation import SimulatedRobots
 from epuck_mj.starts import FreeSpace
 from epuck_mj.tracks import record_tracks
@@ -22,6 +23,10 @@ from epuck_mj.wall_loops import wall_loops
 from evolution.champion import N_TEST, starts_for_test
 from evolution.evaluation import CAPACITY
 from evolution.statistics import mean_interval, worst_share_mean
+
+WHEELED_ROBOT, PLANAR_ROBOT = "epuck", "epuck_planar"
+"""Every champion is reported on the first, whatever it was evolved on, and what was
+evolved on it on the second as well."""
 
 INTERVAL_SEED = 0
 """Of the bootstrap's resamples, so that the same trials give the same interval."""
@@ -69,6 +74,32 @@ class Everybody:
     def __getitem__(self, index: np.ndarray) -> Self:
         """Itself."""
         return self
+
+
+def judging(threads: int = 0) -> Callable[..., "Judge"]:
+    """Gives the judge of a world, the same one for the same world: they take a second.
+
+    Args:
+        threads: that step the robots; 0 is one per core.
+
+    Returns:
+        A function of robot, arena, task and start clearance.
+    """
+
+    @cache
+    def judge(
+        robot: str, arena: str, task: TaskParameters, start_clearance: float
+    ) -> Judge:
+        scene = load_scene(robot, arena, task.control_step)
+        return Judge(scene, task, start_clearance, threads)
+
+    return judge
+
+
+def tested_on(robot: str) -> list[str]:
+    """Robots that champions of a robot are tested on: itself, and the other kind."""
+    other = PLANAR_ROBOT if robot == WHEELED_ROBOT else WHEELED_ROBOT
+    return list(dict.fromkeys([robot, other]))
 
 
 class Judge:

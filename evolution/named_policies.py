@@ -19,6 +19,7 @@ from epuck_mj.wall_follower import WallFollower
 from evolution.config import ExperimentConfig, load_config
 from evolution.run_directory import RunDirectory
 from evolution.study_data import YARDSTICK
+from evolution.study_directory import champions
 
 LAST = "last"
 """Name of the latest generation."""
@@ -74,7 +75,7 @@ def named_policies(path: str, generations: str | None = None) -> list[NamedPolic
     place = Path(path)
     if files.is_file(place):
         return [_champion(place, path, None)]
-    runs = [RunDirectory(champion.parent) for champion in _champions(place)]
+    runs = [RunDirectory(champion.parent) for champion in champions(place)]
     if not runs:
         raise UserError(
             f"no champion in '{path}': expected the directory of a finished run, "
@@ -90,29 +91,25 @@ def named_policies(path: str, generations: str | None = None) -> list[NamedPolic
     ]
 
 
-def _champions(place: Path) -> list[Path]:
-    """A run's own, or those of all the runs of a study."""
-    if not files.is_directory(place):
-        return []
-    return sorted(place.glob("champion.json")) or sorted(
-        place.glob("*/seed-*/champion.json"),
-        key=lambda p: (p.parent.parent.name, len(p.parent.name), p.parent.name),
-    )
-
-
 def _champion(path: Path, name: str, config: ExperimentConfig | None) -> NamedPolicy:
     file = controller.load(path)
     for key in ("robot", "arena"):
         if not isinstance(file.scene.get(key), str):
             raise UserError(f"'{path}' does not say which {key} it is for")
+    # older files do not say
+    clearance = config.start_clearance if config else START_CLEARANCE
+    clearance = file.scene.get("start_clearance", clearance)
+    if not isinstance(clearance, float) or not 0 < clearance <= 1:
+        raise UserError(
+            f"'{path}': expected a start_clearance in (0, 1] m, got {clearance!r}"
+        )
     return NamedPolicy(
         name,
         file.controller,
         TaskParameters.from_dict(file.task),
         file.scene["robot"],
         file.scene["arena"],
-        # a file alone does not say
-        config.start_clearance if config else START_CLEARANCE,
+        clearance,
         file.scores,
         config,
     )

@@ -3,26 +3,29 @@
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from epuck_mj import files
 from epuck_mj.controller import ControllerFile
-from epuck_mj.model import Scene, load_scene
+from epuck_mj.model import Scene
 from epuck_mj.pictures import save_figure
 from epuck_mj.recording import Trial, save_recording
 from epuck_mj.trajectory import record
-from evolution.champion import Champion, choose_champion, most_believed
+from evolution.champion import (
+    N_TEST,
+    Champion,
+    choose_champion,
+    held_out_disturbances,
+    most_believed,
+)
 from evolution.config import ExperimentConfig
 from evolution.evaluation import BatchEngine
-from evolution.experiment import Experiment
+from evolution.experiment import Experiment, Purpose
 from evolution.figures import fitness_figure, trajectory_figure
-from evolution.held_out import HeldOut, Judge
+from evolution.held_out import WHEELED_ROBOT, HeldOut, Judge, judging, tested_on
 from evolution.run_directory import RunDirectory
-
-WHEELED_ROBOT, PLANAR_ROBOT = "epuck", "epuck_planar"
-"""Every champion is reported on the first, whatever it was evolved on, and what was
-evolved on it on the second as well."""
 
 N_SHOWN = 4
 """Trials of the champion in the picture; the first is also the recording."""
@@ -34,17 +37,9 @@ def judges(config: ExperimentConfig, threads: int = 0) -> dict[str, Judge]:
     Raises:
         UserError: if the wheeled robot cannot use the arena, or nobody can measure it.
     """
-    other = PLANAR_ROBOT if config.robot == WHEELED_ROBOT else WHEELED_ROBOT
-    names = {Path(robot).name: robot for robot in (config.robot, other)}
-    return {
-        name: Judge(
-            load_scene(robot, config.arena, config.control_step),
-            config.task,
-            config.start_clearance,
-            threads,
-        )
-        for name, robot in names.items()
-    }
+    judge = judging(threads)
+    world = config.arena, config.task, config.start_clearance
+    return {Path(robot).name: judge(robot, *world) for robot in tested_on(config.robot)}
 
 
 def write_results(
@@ -70,11 +65,17 @@ def write_results(
     )
     policy = config.network.decode(champion.genome)
     tests = {robot: judge.test(policy) for robot, judge in judges.items()}
+    met = held_out_disturbances(config, Purpose.TEST, N_TEST)
+    as_evolved = {
+        robot: judge.test(policy, N_TEST, met)
+        for robot, judge in judges.items()
+        if met is not None
+    }
     # what the run believed its best to be, and what that is worth where it evolved
     genome, stored = most_believed(experiment)
     believed = next(iter(judges.values())).test(config.network.decode(genome))
     most = {"stored": stored, "held_out": believed.mean}
-    controller = _controller_file(experiment, champion, tests, most)
+    controller = _controller_file(experiment, champion, tests, as_evolved, most)
     files.write_text(directory.champion, controller.to_json())
     _draw_fitness(experiment, directory)
     wheeled = judges[WHEELED_ROBOT]
@@ -84,26 +85,30 @@ def write_results(
 
 
 def summary(controller: ControllerFile) -> str:
-    """Held-out fitness on each robot and stored fitness, a line each."""
+    """Held-out fitness on each robot and stored fitness, in lines."""
     scores, steps = controller.scores, controller.task["steps"]
     starts = next(iter(scores["held_out"].values()))["starts"]
-    return (
+    lines = [
         f"Held-out fitness of {steps}, mean of {starts} fresh starts: "
-        f"{_held_out(controller)}\n"
-        f"Stored fitness of {steps}, what evolution believes: {scores['stored']:.1f}"
-    )
+        + _held_out(scores["held_out"]),
+        f"Stored fitness of {steps}, what evolution believes: {scores['stored']:.1f}",
+    ]
+    if "held_out_as_evolved" in scores:
+        disturbed = _held_out(scores["held_out_as_evolved"])
+        lines.insert(1, f"The same on robots as it evolved on: {disturbed}")
+    return "\n".join(lines)
 
 
 def scores(controller: ControllerFile) -> str:
     """The same in short."""
-    stored = controller.scores["stored"]
-    return f"held-out {_held_out(controller)}; stored {stored:.1f}"
+    scores = controller.scores
+    return f"held-out {_held_out(scores['held_out'])}; stored {scores['stored']:.1f}"
 
 
-def _held_out(controller: ControllerFile) -> str:
+def _held_out(tests: Mapping[str, Any]) -> str:
     return ", ".join(
         f"{robot} {test['mean']:.1f} ({test['crash_rate']:.0%} crash)"
-        for robot, test in controller.scores["held_out"].items()
+        for robot, test in tests.items()
     )
 
 
@@ -111,9 +116,19 @@ def _controller_file(
     experiment: Experiment,
     champion: Champion,
     tests: dict[str, HeldOut],
+    as_evolved: dict[str, HeldOut],
     most_believed: dict[str, float],
 ) -> ControllerFile:
     config = experiment.config
+    scores: dict[str, Any] = {
+        "stored": champion.stored_fitness,
+        "validation": champion.validation_fitness,
+        "held_out": {robot: asdict(test) for robot, test in tests.items()},
+        "most_believed": most_believed,
+    }
+    if as_evolved:
+        disturbed = {robot: asdict(test) for robot, test in as_evolved.items()}
+        scores["held_out_as_evolved"] = disturbed
     return ControllerFile(
         network=config.network,
         genome=champion.genome,
@@ -121,14 +136,10 @@ def _controller_file(
         scene={
             "robot": config.robot,
             "arena": config.arena,
+            "start_clearance": config.start_clearance,
             "mjcf_sha256": dict(experiment.scene.sha256),
         },
-        scores={
-            "stored": champion.stored_fitness,
-            "validation": champion.validation_fitness,
-            "held_out": {robot: asdict(test) for robot, test in tests.items()},
-            "most_believed": most_believed,
-        },
+        scores=scores,
     )
 
 

@@ -1,8 +1,9 @@
 """The run directory: what a run leaves behind, and what it can be resumed from."""
 
+import csv
 import json
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,36 @@ from evolution.provenance import now, to_json
 
 LOCK = ".lock"
 """File that the process which works in a directory holds."""
+
+
+@contextmanager
+def locked(directory: Path, patience: float = 0.0) -> Iterator[None]:
+    """Keep every other process out of a directory for the time of the block.
+
+    Args:
+        directory: made if it is not there.
+        patience: how long to wait for one that is there [s].
+
+    Raises:
+        UserError: if one is there all that time, or the directory cannot be made.
+    """
+    with files.writing(directory):
+        directory.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(directory / LOCK, timeout=patience)
+    try:
+        lock.acquire()
+    except Timeout:
+        raise UserError(
+            f"another process is working in '{directory}': wait for it, or stop it"
+        ) from None
+    except OSError as error:
+        raise UserError(f"cannot write output '{directory}': {error.strerror}") from (
+            None
+        )
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 class RunDirectory:
@@ -36,33 +67,9 @@ class RunDirectory:
         self.trajectory_figure = path / "trajectory.png"
         self.recording = path / "champion.rrd"
 
-    @contextmanager
-    def locked(self, patience: float = 0.0) -> Iterator[None]:
-        """Keep every other process out for the time of the block.
-
-        Args:
-            patience: how long to wait for one that is there [s].
-
-        Raises:
-            UserError: if one is there all that time, or the directory cannot be made.
-        """
-        with files.writing(self.path):
-            self.path.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(self.path / LOCK, timeout=patience)
-        try:
-            lock.acquire()
-        except Timeout:
-            raise UserError(
-                f"another process is working in '{self.path}': wait for it, or stop it"
-            ) from None
-        except OSError as error:
-            raise UserError(
-                f"cannot write output '{self.path}': {error.strerror}"
-            ) from None
-        try:
-            yield
-        finally:
-            lock.release()
+    def locked(self, patience: float = 0.0) -> AbstractContextManager[None]:
+        """See `locked`."""
+        return locked(self.path, patience)
 
     def refuse_if_used(self) -> None:
         """Refuse a directory that holds anything.
@@ -147,7 +154,7 @@ class RunDirectory:
         with files.writing(self.path):
             files.remove_leftovers(self.path)
             # the run may have been killed between its files
-            self._write_derived(experiment)
+            self._write_derived(experiment, ())
             resumed = [*first.get("resumed", ()), provenance]
             files.write_text(self.provenance, to_json({**first, "resumed": resumed}))
         keys = ("versions", "git", "processor")
@@ -176,24 +183,14 @@ class RunDirectory:
         try:
             state = {"config": config, **experiment.state()}
             files.write_arrays(self.checkpoint, state)
-            self._write_derived(experiment)
-            with self.timing.open("a", encoding="utf-8") as file:
-                if file.tell() == 0:
-                    file.write("generation,seconds,control_steps,crash_rate\n")
-                file.writelines(
-                    f"{record.generation},{taken:.3f},{record.control_steps},"
-                    f"{record.crash_rate:.4f}\n"
-                    for record, taken in zip(
-                        experiment.records[-len(seconds) :], seconds, strict=True
-                    )
-                )
+            self._write_derived(experiment, seconds)
         except OSError as error:
             raise UserError(
                 f"cannot write '{self.path}': {error.strerror}; what was there before "
                 f"is intact: --resume {self.path}"
             ) from None
 
-    def _write_derived(self, experiment: Experiment) -> None:
+    def _write_derived(self, experiment: Experiment, seconds: Sequence[float]) -> None:
         """What the checkpoint holds as well, for those who only read."""
         files.write_text(self.history, experiment.history())
         if experiment.records:
@@ -202,6 +199,25 @@ class RunDirectory:
                 "fitness": np.array([record.best for record in experiment.records]),
             }
             files.write_arrays(self.best_individuals, best)
+            files.write_text(self.timing, self._timing(experiment, seconds))
+
+    def _timing(self, experiment: Experiment, seconds: Sequence[float]) -> str:
+        """Text of timing.csv; no seconds where a kill took them."""
+        taken: dict[int, str] = {}
+        if files.is_file(self.timing):
+            rows = csv.DictReader(self.timing.read_text(encoding="utf-8").splitlines())
+            for row in rows:
+                # a row that was cut off says nothing
+                with suppress(KeyError, TypeError, ValueError):
+                    taken[int(row["generation"])] = f"{float(row['seconds']):.3f}"
+        first = len(experiment.records) - len(seconds)
+        taken |= {first + i: f"{each:.3f}" for i, each in enumerate(seconds)}
+        lines = [
+            f"{record.generation},{taken.get(record.generation, '')},"
+            f"{record.control_steps},{record.crash_rate:.4f}\n"
+            for record in experiment.records
+        ]
+        return "".join(["generation,seconds,control_steps,crash_rate\n", *lines])
 
     def evaluations(self) -> int:
         """Individuals evaluated up to the checkpoint."""

@@ -76,7 +76,7 @@ def study(argv: Sequence[str]) -> int:
         names = [name.strip() for name in options.experiments.split(",")]
         config = config.only(names)
     directory = StudyDirectory(options.output)
-    directory.open(config)
+    directory.open(config, seeds)
     typed = tuple(argv)
     # all experiments of a seed before the next: a study cut short is still paired
     everything = [
@@ -145,11 +145,17 @@ def _events(jobs: Sequence[Job], options: Options) -> Iterator[Event]:
         return carry_out_on_cluster(
             jobs, options.cluster, options.split, options.racing
         )
-    # from Python 3.13 on, the cores this process may use
-    cores = getattr(os, "process_cpu_count", os.cpu_count)() or 1
+    cores = _cores()
     n_processes = min(options.jobs or cores, max(1, len(jobs)))
     means = Means(threads=max(1, cores // n_processes), racing=options.racing)
     return carry_out_side_by_side(jobs, means, n_processes)
+
+
+def _cores() -> int:
+    """Cores that this process may use: a cluster's scheduler may have given it few."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _shown(

@@ -1,7 +1,7 @@
 """What a study is: experiments that are run with the same seeds and compared."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -173,6 +173,20 @@ def parse_seeds(text: str) -> list[int]:
     if len(set(seeds)) < len(seeds):
         raise UserError(f"expected every seed once, got '{text}'")
     return sorted(seeds)
+
+
+def seeds_text(seeds: Sequence[int]) -> str:
+    """Ascending seeds as the command line takes them: 1-3,7."""
+    groups: list[list[int]] = []
+    for seed in seeds:
+        if groups and seed == groups[-1][-1] + 1:
+            groups[-1].append(seed)
+        else:
+            groups.append([seed])
+    return ",".join(
+        str(group[0]) if len(group) == 1 else f"{group[0]}-{group[-1]}"
+        for group in groups
+    )
 
 
 SEEDS = re.compile(r"(\d{1,18})(?:-(\d{1,18}))?", re.ASCII)

@@ -16,6 +16,7 @@ from epuck_mj.errors import UserError
 from evolution.config import ExperimentConfig, differing_keys
 from evolution.experiment import HISTORY
 from evolution.run_directory import RunDirectory
+from evolution.study_config import seeds_text
 from evolution.study_directory import StudyDirectory
 
 YARDSTICK = "wall-follower"
@@ -91,6 +92,7 @@ def load_study(path: Path) -> StudyData:
     config = directory.stored_config()
     runs: dict[str, tuple[RunData, ...]] = {}
     missing: list[str] = []
+    asked = directory.asked_seeds()
     for name, experiment in config.experiments.items():
         finished = []
         for seed in directory.seeds(name):
@@ -99,6 +101,10 @@ def load_study(path: Path) -> StudyData:
             except UserError as error:
                 missing.append(f"{name} seed {seed}: {error}")
         runs[name] = tuple(finished)
+        not_begun = set(asked.get(name, ())) - set(directory.seeds(name))
+        if not_begun:
+            seeds = seeds_text(sorted(not_begun))
+            missing.append(f"{name} seeds {seeds}: asked for, not begun")
         if not finished:
             missing.append(f"{name}: no finished run")
     everything = [run for each in runs.values() for run in each]
@@ -156,7 +162,7 @@ class _Test(BaseModel):
     interval: tuple[float, float] | None = None
     worst: FiniteFloat | None = None
     crash_rate: FiniteFloat
-    starts: int = 0
+    starts: int = Field(gt=0)
     behaviour: dict[str, FiniteFloat] | None = None
     metrics: dict[str, FiniteFloat | None] | None = None
 
@@ -172,6 +178,7 @@ class _Yardstick(BaseModel):
 
 class _Scores(_Yardstick):
     stored: FiniteFloat
+    held_out_as_evolved: dict[str, _Test] = {}
     most_believed: _Believed | None = None
 
 

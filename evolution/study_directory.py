@@ -1,13 +1,36 @@
 """The study directory: one run directory per experiment and seed, and what they are."""
 
+from collections.abc import Collection
 from pathlib import Path
+
+import yaml
 
 from epuck_mj import files
 from epuck_mj.errors import UserError
-from evolution.run_directory import RunDirectory
-from evolution.study_config import StudyConfig
+from evolution.config import read_mapping
+from evolution.run_directory import LOCK, RunDirectory, locked
+from evolution.study_config import StudyConfig, parse_seeds, seeds_text
 
 PREFIX = "seed-"
+
+PATIENCE = 10.0
+"""How long to wait for another process that opens the same study [s]."""
+
+
+def champions(place: Path) -> list[Path]:
+    """The champion of the run at a place, or those of all runs of the study there."""
+    if not files.is_directory(place):
+        return []
+    run = RunDirectory(place)
+    if files.is_file(run.champion):
+        return [run.champion]
+    study = StudyDirectory(place)
+    return [
+        path
+        for name in sorted(each.name for each in place.iterdir() if each.is_dir())
+        for seed in study.seeds(name)
+        if files.is_file(path := study.run(name, seed).champion)
+    ]
 
 
 class StudyDirectory:
@@ -17,6 +40,7 @@ class StudyDirectory:
         """Name the directory; nothing is touched yet."""
         self.path = path
         self.config = path / "study.yaml"
+        self.asked = path / "seeds.yaml"
         self.yardstick = path / "wall-follower.json"
 
     def run(self, name: str, seed: int) -> RunDirectory:
@@ -30,8 +54,19 @@ class StudyDirectory:
         # not seed-01, a copy that a person made: it would count as seed 1 again
         return sorted(int(n) for n in numbers if n.isdecimal() and str(int(n)) == n)
 
-    def open(self, config: StudyConfig) -> None:
-        """Make the directory, or go on with it; more experiments may join.
+    def asked_seeds(self) -> dict[str, list[int]]:
+        """Seeds that were ever asked for, by experiment; older studies do not say.
+
+        Raises:
+            UserError: if the file that says so is damaged.
+        """
+        if not files.is_file(self.asked):
+            return {}
+        stored = read_mapping(self.asked)
+        return {str(name): parse_seeds(str(text)) for name, text in stored.items()}
+
+    def open(self, config: StudyConfig, seeds: Collection[int]) -> None:
+        """Make the directory, or go on with it; experiments and seeds may join.
 
         Raises:
             UserError: if it is something else, another study, or cannot be written.
@@ -39,20 +74,29 @@ class StudyDirectory:
         if files.is_file(self.path):
             raise UserError(f"output '{self.path}' is not a directory")
         with files.writing(self.path):
-            if files.is_file(self.config):
-                config = self.stored_config().merged(config, self.path)
-            elif self.path.is_dir() and self._holds_anything():
+            if not files.is_file(self.config) and self._holds_anything():
                 raise UserError(
                     f"output '{self.path}' is not empty and holds no study: expected "
                     "a new directory, or one with a study.yaml"
                 )
-            self.path.mkdir(parents=True, exist_ok=True)
-            files.remove_leftovers(self.path)
-            files.write_text(self.config, config.to_yaml())
+            # somebody else may be about to add experiments or seeds
+            with locked(self.path, PATIENCE):
+                files.remove_leftovers(self.path)
+                asked = self.asked_seeds()
+                for name in config.experiments:
+                    asked[name] = sorted({*asked.get(name, ()), *seeds})
+                if files.is_file(self.config):
+                    config = self.stored_config().merged(config, self.path)
+                files.write_text(self.config, config.to_yaml())
+                texts = {name: seeds_text(each) for name, each in asked.items()}
+                files.write_text(self.asked, yaml.safe_dump(texts, sort_keys=False))
 
     def _holds_anything(self) -> bool:
         """Whether more is there than what a killed writer left behind."""
-        return set(self.path.iterdir()) > set(files.leftovers(self.path))
+        if not files.is_directory(self.path):
+            return False
+        aside = {*files.leftovers(self.path), self.path / LOCK}
+        return bool(set(self.path.iterdir()) - aside)
 
     def stored_config(self) -> StudyConfig:
         """The study that is there.

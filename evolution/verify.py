@@ -4,22 +4,27 @@ MuJoCo gives the same bits for one version on one type of processor only. Where 
 fitness differs, what else differs is named.
 """
 
+import json
 import platform
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import tyro
 
-from epuck_mj import controller
+from epuck_mj import controller, files
 from epuck_mj.command_line import check_threads, main, parse
+from epuck_mj.controller import ControllerFile
 from epuck_mj.errors import UserError
-from epuck_mj.model import load_scene
-from evolution.held_out import Judge
+from evolution.champion import held_out_disturbances
+from evolution.config import ExperimentConfig
+from evolution.experiment import Purpose
+from evolution.held_out import Judge, judging
 from evolution.provenance import processor
 from evolution.run_directory import RunDirectory
 from evolution.study_data import check_scores
+from evolution.study_directory import champions
 
 MODULE = "evolution.verify"
 
@@ -50,7 +55,8 @@ def verify(argv: Sequence[str]) -> int:
     runs = [run for path in options.paths for run in _runs(path)]
     if not runs:
         raise UserError("expected run or study directories")
-    same = [_verified(run, options.threads) for run in runs]
+    judge = judging(options.threads)
+    same = [_verified(run, judge) for run in runs]
     print(f"{sum(same)} of {len(same)} champions score the same to the last bit")
     return 0 if all(same) else 1
 
@@ -61,35 +67,24 @@ def _runs(path: Path) -> list[RunDirectory]:
     Raises:
         UserError: if there are none.
     """
-    champions = [*path.glob("champion.json"), *path.glob("*/seed-*/champion.json")]
-    if not champions:
+    found = champions(path)
+    if not found:
         raise UserError(
             f"no champion in '{path}': expected the directory of a finished run, or "
             "of a study with one"
         )
-    return [RunDirectory(champion.parent) for champion in sorted(champions)]
+    return [RunDirectory(champion.parent) for champion in found]
 
 
-def _verified(run: RunDirectory, threads: int) -> bool:
-    """Whether the champion scores the same; says so, or what differs."""
+def _verified(run: RunDirectory, judge: Callable[..., Judge]) -> bool:
+    """Whether all scores are the same; says so, or what differs."""
     config, champion = run.stored_config(), controller.load(run.champion)
     check_scores(champion.scores, run.champion)
-    differing = []
-    for robot, written in champion.scores["held_out"].items():
-        # its own robot may be a file
-        named = config.robot if Path(config.robot).name == robot else robot
-        scene = load_scene(named, config.arena, config.control_step)
-        judge = Judge(scene, config.task, config.start_clearance, threads)
-        again = judge.test(champion.controller, written["starts"])
-        if again.mean != written["mean"]:
-            differing.append(
-                f"{robot} {written['mean']!r} is now {again.mean!r} "
-                f"({again.mean - written['mean']:+.3g}, 95 % CI "
-                f"{again.interval[0]:.1f} to {again.interval[1]:.1f})"
-            )
-        before = champion.scene.get("mjcf_sha256")
-        if named == champion.scene.get("robot") and before != dict(scene.sha256):
-            differing.append(f"{robot}: its robot or arena has been edited since")
+    differing = [
+        *_differing(champion, config, judge),
+        *_most_believed(run, champion, config, judge),
+        *_edited(champion, config, judge),
+    ]
     if differing:
         causes = _changes(run.provenance_fields())
         print(f"{run.path}: {'; '.join(differing)}")
@@ -99,6 +94,61 @@ def _verified(run: RunDirectory, threads: int) -> bool:
     else:
         print(f"{run.path}: the same to the last bit")
     return not differing
+
+
+def _differing(
+    champion: ControllerFile, config: ExperimentConfig, judge: Callable[..., Judge]
+) -> Iterator[str]:
+    """What of the champion's held-out evaluations is not what is written."""
+    world = config.arena, config.task, config.start_clearance
+    for kind in ("held_out", "held_out_as_evolved"):
+        for robot, written in champion.scores.get(kind, {}).items():
+            n, met = written["starts"], None
+            if kind == "held_out_as_evolved":
+                met = held_out_disturbances(config, Purpose.TEST, n)
+            # its own robot may be a file
+            named = config.robot if Path(config.robot).name == robot else robot
+            test = judge(named, *world).test(champion.controller, n, met)
+            # as it is read back
+            again = json.loads(json.dumps(asdict(test)))
+            if again["mean"] != written["mean"]:
+                low, high = test.interval
+                yield (
+                    f"{robot} {written['mean']!r} is now {test.mean!r} "
+                    f"({test.mean - written['mean']:+.3g}, 95 % CI {low:.1f} to "
+                    f"{high:.1f})"
+                )
+            elif others := [key for key in written if again.get(key) != written[key]]:
+                yield f"{robot}, the same mean, but other {', '.join(others)}"
+
+
+def _most_believed(
+    run: RunDirectory,
+    champion: ControllerFile,
+    config: ExperimentConfig,
+    judge: Callable[..., Judge],
+) -> Iterator[str]:
+    """Whether the individual with the highest stored fitness has another fitness."""
+    written = champion.scores.get("most_believed")
+    if not written or not files.is_file(run.best_individuals):
+        return
+    best = files.read_arrays(run.best_individuals)
+    generation = best["fitness"].argmax()
+    policy = config.network.decode(best["genomes"][generation])
+    world = config.robot, config.arena, config.task, config.start_clearance
+    mean = judge(*world).test(policy).mean
+    if mean != written["held_out"]:
+        yield f"the most believed {written['held_out']!r} is now {mean!r}"
+
+
+def _edited(
+    champion: ControllerFile, config: ExperimentConfig, judge: Callable[..., Judge]
+) -> Iterator[str]:
+    """Whether robot or arena have been edited since."""
+    world = config.arena, config.task, config.start_clearance
+    now = dict(judge(config.robot, *world).scene.sha256)
+    if champion.scene.get("mjcf_sha256") != now:
+        yield "its robot or arena has been edited since"
 
 
 def _changes(provenance: dict) -> list[str]:

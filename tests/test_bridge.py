@@ -198,7 +198,8 @@ def test_calibration_over_wifi(planar, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "signum", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT]
+    "signum",
+    [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP],
 )
 def test_signals(planar, port, tmp_path, signum):
     with (
@@ -352,6 +353,8 @@ def test_the_next_bridge_stops_a_robot_first(planar, port, tmp_path):
         (["wall-follower", "--port", "x", "--arena", "no"], "no arena 'no'"),
         (["wall-follower", "--port", "x", "--calibration", "no"], "calibration 'no'"),
         (["wall-follower", "--port", "x", "--log", "/proc/x/y"], "cannot write"),
+        (["wall-follower", "--port", "x", "--log", "."], "expected --log"),
+        (["wall-follower", "--port", "tcp://[::1"], "expected tcp://host"),
         (["wall-follower", "--port", "x", "--nonsense"], "nonsense"),
     ],
 )

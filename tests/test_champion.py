@@ -16,14 +16,16 @@ from evolution import champion as champion_module
 from evolution import results
 from evolution.champion import (
     LATEST_BEST,
+    N_TEST,
     candidates,
     choose_champion,
+    held_out_disturbances,
     most_believed,
     starts_for_test,
     starts_for_validation,
 )
 from evolution.config import ExperimentConfig, find_config, load_config
-from evolution.experiment import Experiment, Record
+from evolution.experiment import Experiment, Purpose, Record
 from evolution.held_out import Judge
 from evolution.results import judges, summary, write_results
 from evolution.run_directory import RunDirectory
@@ -212,8 +214,12 @@ def test_held_out_against_a_slow_loop(finished):
 def few_test_starts():
     """What is said of 1,000 starts is true of fewer."""
     test = Judge.test
+
+    def few(self, policy, n=30, met=None):
+        return test(self, policy, min(n, 30), None if met is None else met[:30])
+
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Judge, "test", lambda self, policy, n=30: test(self, policy, n))
+        patch.setattr(Judge, "test", few)
         yield
 
 
@@ -269,8 +275,31 @@ def test_the_champion_file_holds_every_score(written):
     assert stored.scene == {
         "robot": "epuck_planar",
         "arena": "arena",
+        "start_clearance": 0.01,
         "mjcf_sha256": dict(experiment.scene.sha256),
     }
+
+
+def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(results, "_draw_fitness", lambda *_: None)
+    monkeypatch.setattr(results, "_show", lambda *_: None)
+    config = tiny("ga", steps=60, noise="strong", randomise=True)
+    experiment = Experiment(config, threads=1)
+    list(experiment.run())
+    directory = RunDirectory(tmp_path)
+    stored = write_results(experiment, judges(config), directory, threads=1)
+    found = stored.scores["held_out_as_evolved"]
+    assert list(found) == list(stored.scores["held_out"]) == ["epuck_planar", "epuck"]
+    # the first of those that anybody draws
+    met = held_out_disturbances(config, Purpose.TEST, N_TEST)
+    assert met is not None
+    test = judges(config)["epuck"].test(stored.controller, 30, met)
+    assert found["epuck"] == asdict(test)
+    assert found["epuck"]["mean"] != stored.scores["held_out"]["epuck"]["mean"]
+    _, disturbed, _ = summary(stored).splitlines()
+    assert disturbed.startswith("The same on robots as it evolved on: epuck_planar ")
 
 
 def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):

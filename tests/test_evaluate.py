@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -157,6 +158,30 @@ def test_verify_names_what_differs(finished, tmp_path, capsys):
     assert "mujoco 3.0.0 is now " in text
     assert "CPU flags gone: vax" in text
     assert "0 of 1 champions score the same" in text
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (lambda s: s["held_out"]["epuck"].update(crash_rate=0.5), "other crash_rate"),
+        (
+            lambda s: s["held_out"]["epuck_planar"]["behaviour"].update(spinner=0.5),
+            "epuck_planar, the same mean, but other behaviour",
+        ),
+        (lambda s: s["most_believed"].update(held_out=1.0), "the most believed 1.0 is"),
+    ],
+    ids=["crash rate", "behaviour", "most believed"],
+)
+def test_verify_compares_everything_that_is_reported(
+    finished, tmp_path, capsys, damage, words
+):
+    copy = tmp_path / "run"
+    shutil.copytree(finished, copy)
+    fields = json.loads((copy / "champion.json").read_text())
+    damage(fields["scores"])
+    (copy / "champion.json").write_text(json.dumps(fields))
+    assert verify([str(copy)]) == 1
+    assert words in capsys.readouterr().out
 
 
 def test_verify_needs_a_champion(tmp_path):

@@ -265,6 +265,25 @@ def test_a_socket():
         link.reopen(time.monotonic())
 
 
+def test_a_port_that_is_no_file_has_no_guardian():
+    """Such are rfc2217:// and all of Windows: nothing to share."""
+    link = Link(lambda: SerialPort("loop://", farewell=b"D,0,0"))
+    link.close()
+
+
+def test_a_port_is_closed_if_no_guardian_can_be_had(monkeypatch):
+    closed = []
+
+    def refuse(*_) -> None:
+        raise BlockingIOError(11, "no more processes")
+
+    monkeypatch.setattr("epuck_mj.bridge.link.guardian.hire", refuse)
+    monkeypatch.setattr(SerialPort, "close", lambda port: closed.append(port.name))
+    with pytest.raises(UserError, match="no guardian for 'loop://'"):
+        SerialPort("loop://", farewell=b"D,0,0")
+    assert closed == ["loop://"]
+
+
 @pytest.mark.parametrize(
     ("name", "message"),
     [

@@ -187,6 +187,21 @@ def test_an_arena_with_another_include_and_its_own_robot_file(tmp_path):
     assert scene.model.nq == 3
 
 
+def test_an_included_file_includes_no_others(tmp_path):
+    """MuJoCo would look for them where one happens to be; nobody would hash them."""
+    inner = '<mujoco><worldbody><geom name="pillar" size="0.02"/></worldbody></mujoco>'
+    (tmp_path / "inner.xml").write_text(inner)
+    more = tmp_path / "more.xml"
+    more.write_text('<mujoco><include file="inner.xml"/></mujoco>')
+    path = tmp_path / "arena.xml"
+    path.write_text(WALLS.replace("</mujoco>", '<include file="more.xml"/></mujoco>'))
+    assert refusal(arena=path).startswith(f"'{more}' includes 'inner.xml'")
+    robot = tmp_path / "robot.xml"
+    text = (MODELS / "epuck.xml").read_text()
+    robot.write_text(text.replace("</mujoco>", '<include file="inner.xml"/></mujoco>'))
+    assert "includes 'inner.xml'" in refusal(robot=robot)
+
+
 @pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
 def test_a_copied_arena_needs_no_copied_robot(tmp_path, robot):
     path = tmp_path / "copy.xml"

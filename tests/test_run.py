@@ -746,8 +746,9 @@ def test_kill_9_at_any_moment_loses_at_most_one_generation(reference, tmp_path):
     assert n_records(directory) == LONG_GENERATIONS
     assert {path.name for path in directory.iterdir()} == THERE
     timed = (directory / "timing.csv").read_text().split()[1:]
-    generations = [int(row.split(",")[0]) for row in timed]
-    assert generations == sorted(set(generations))
+    assert [int(row.split(",")[0]) for row in timed] == list(range(LONG_GENERATIONS))
+    # a kill may take the seconds of generations, never their control steps
+    assert all(int(row.split(",")[2]) > 0 for row in timed)
     resumed = json.loads((directory / "provenance.json").read_text())["resumed"]
     assert 1 <= len(resumed) <= len(moments)
 

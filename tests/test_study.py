@@ -422,12 +422,10 @@ def test_a_run_killed_alone_is_reported_and_the_next_call_completes_it(
     assert list(map(str, carried.jobs)) == ["one seed 1"]
     assert_reproduced(one, reference / "seed-1")
     assert written(two) == kept
-    # gone on with, not begun again; the kill may have cost the row of a generation
+    # gone on with, not begun again
     assert done > 2
     rows = (one / "timing.csv").read_text().splitlines()[1:]
-    timed = [int(row.split(",")[0]) for row in rows]
-    assert timed == sorted(set(timed))
-    assert len(timed) >= LONG // 10 - 1
+    assert [int(row.split(",")[0]) for row in rows] == list(range(LONG // 10))
     assert len(provenance(one)["resumed"]) == 1
 
 

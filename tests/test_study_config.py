@@ -1,6 +1,8 @@
 """Studies: what they are read from, how they are stored, and what joins them."""
 
 import shutil
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.model import MODELS
 from evolution.config import find_config, load_config
 from evolution.optimizer import OPTIMIZERS
+from evolution.run_directory import locked
 from evolution.study_config import StudyConfig, find_study, parse_seeds
 from evolution.study_directory import StudyDirectory
 
@@ -249,28 +252,55 @@ def test_a_damaged_one_is_refused(content, words, here):
 def test_a_new_directory_holds_the_study(here):
     config = study("experiments: [ga, de-best]")
     directory = StudyDirectory(here / "deep" / "out")
-    directory.open(config)
-    assert [path.name for path in directory.path.iterdir()] == ["study.yaml"]
+    directory.open(config, [3, 1, 2])
+    names = sorted(path.name for path in directory.path.iterdir())
+    assert names == [".lock", "seeds.yaml", "study.yaml"]
     assert directory.stored_config() == config
     assert directory.run("ga", 3).path == directory.path / "ga" / "seed-3"
     before = directory.config.read_bytes()
     # again, and with less
-    directory.open(config.only(["de-best"]))
+    directory.open(config.only(["de-best"]), [2, 7])
     assert directory.config.read_bytes() == before
-    directory.open(study("experiments: [de-rand]"))
+    directory.open(study("experiments: [de-rand]"), [1])
     assert list(directory.stored_config().experiments) == ["ga", "de-best", "de-rand"]
+    asked = {"ga": [1, 2, 3], "de-best": [1, 2, 3, 7], "de-rand": [1]}
+    assert directory.asked_seeds() == asked
+
+
+def test_two_that_open_a_study_at_once_both_have_their_say(here):
+    """One is about to write when the other comes, and waits."""
+    directory = StudyDirectory(here / "out")
+    with ThreadPoolExecutor() as pool:
+        with locked(directory.path):
+            both = [
+                pool.submit(directory.open, study(f"experiments: [{name}]"), [seed])
+                for name, seed in (("ga", 1), ("de-best", 2))
+            ]
+            time.sleep(0.2)
+            assert not any(each.done() for each in both)
+        for each in both:
+            each.result(timeout=30)
+    assert set(directory.stored_config().experiments) == {"ga", "de-best"}
+    assert directory.asked_seeds() == {"ga": [1], "de-best": [2]}
+
+
+@pytest.mark.parametrize("content", ["ga: 1-x", "[ga]", "ga: {1: 2}"])
+def test_damaged_seeds_are_refused(content, here):
+    directory = StudyDirectory(here)
+    directory.asked.write_text(content)
+    assert refused(directory.asked_seeds)
 
 
 def test_an_empty_directory_is_as_good_as_none(here):
     (here / "out").mkdir()
-    StudyDirectory(Path("out")).open(study("experiments: [ga]"))
+    StudyDirectory(Path("out")).open(study("experiments: [ga]"), [1])
     assert files.is_file(here / "out" / "study.yaml")
 
 
 def test_what_a_killed_writer_left_is_in_nobodys_way(here):
     (here / "out").mkdir()
-    (here / "out" / ".study.yaml-b2q7x_1c").write_text("ga:")
-    StudyDirectory(Path("out")).open(study("experiments: [ga]"))
+    (here / "out" / ".study.yaml-b2q7x_1c.tmp").write_text("ga:")
+    StudyDirectory(Path("out")).open(study("experiments: [ga]"), [1])
     assert files.is_file(here / "out" / "study.yaml")
 
 
@@ -293,20 +323,21 @@ def test_what_is_no_study_is_refused_and_left_alone(here):
         ("thesis", "output 'thesis' is not empty and holds no study"),
         (300 * "a", "cannot write"),
     ]:
-        assert words in refused(StudyDirectory(Path(name)).open, config)
+        assert words in refused(StudyDirectory(Path(name)).open, config, [1])
     assert (here / "file").read_text() == "years of work"
     assert [path.name for path in (here / "thesis").iterdir()] == ["thesis.tex"]
 
 
 def test_another_study_is_refused_and_left_alone(here):
     directory = StudyDirectory(Path("out"))
-    directory.open(study("experiments: [ga, de-best]"))
+    directory.open(study("experiments: [ga, de-best]"), [1])
     before = directory.config.read_bytes()
     other = study("experiments: [de-best, de-rand]\ncommon: {v_max: 0.1}")
-    message = refused(directory.open, other)
+    message = refused(directory.open, other, [2])
     assert message.startswith("'out' is a study of another config")
     assert "experiment 'de-best' differs in: v_max (stored " in message
     assert directory.config.read_bytes() == before
+    assert directory.asked_seeds() == {"ga": [1], "de-best": [1]}
 
 
 def test_a_directory_without_a_study_has_none_to_read(here):
@@ -319,7 +350,7 @@ def test_a_directory_without_a_study_has_none_to_read(here):
 def test_a_damaged_study_is_refused_and_kept(content, here):
     (here / "out").mkdir()
     (here / "out" / "study.yaml").write_text(content)
-    message = refused(StudyDirectory(Path("out")).open, study("experiments: [ga]"))
+    message = refused(StudyDirectory(Path("out")).open, study("experiments: [ga]"), [1])
     assert "out/study.yaml" in message
     assert (here / "out" / "study.yaml").read_text() == content
 

@@ -33,6 +33,7 @@ DAMAGE: dict[str, Callable[[dict], object]] = {
     "interval of three": lambda f: f["scores"]["held_out"]["epuck"].update(
         interval=[1, 2, 3]
     ),
+    "no starts": lambda f: f["scores"]["held_out"]["epuck"].pop("starts"),
     "most_believed empty": lambda f: f["scores"].update(most_believed={}),
     "task empty": lambda f: f.update(task={}),
     "steps a text": lambda f: f["task"].update(steps="300"),
@@ -70,6 +71,16 @@ def test_edited_provenance_is_left_out(path, change):
     file = path / "ga" / "seed-1" / "provenance.json"
     edit(file, lambda fields: fields.update(change))
     assert provenance(load_study(path))["git"]
+
+
+def test_seeds_that_were_asked_for_are_missed(path):
+    assert load_study(path).missing == ()
+    (path / "seeds.yaml").write_text("de-best: 1-30\nga: 1-3\nde-rand: '4'\n")
+    (path / "ga" / "seed-3").mkdir()
+    assert load_study(path).missing == (
+        "de-best seeds 3-30: asked for, not begun",
+        "ga seed 3: not finished",
+    )
 
 
 @pytest.mark.parametrize("row", ["2,0,1.0,1.0,1.0", "2,450,inf,1.0,1.0", "2,450,1.0"])

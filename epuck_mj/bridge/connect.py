@@ -8,6 +8,7 @@ from epuck_mj.bridge.protocol import RESYNC, ascii, packets
 from epuck_mj.bridge.serial_line import SerialLine
 from epuck_mj.bridge.wifi_line import WifiLine
 from epuck_mj.constants import WIFI_PORT
+from epuck_mj.errors import UserError
 
 WIFI = "tcp://"
 """What the name of a WiFi robot begins with."""
@@ -18,10 +19,19 @@ def connect(port: str) -> Connection:
 
     Args:
         port: `/dev/rfcomm0`, `COM5`, `socket://host:port`, or `tcp://host[:port]`.
+
+    Raises:
+        UserError: if it is no address.
     """
     if port.startswith(WIFI):
         name = f"socket://{port.removeprefix(WIFI)}"
-        if not urlsplit(name).netloc.rpartition("]")[2].count(":"):
+        try:
+            address = urlsplit(name).netloc
+        except ValueError as error:
+            raise UserError(f"expected {WIFI}host[:port], got '{port}': {error}") from (
+                None
+            )
+        if not address.rpartition("]")[2].count(":"):
             name += f":{WIFI_PORT}"
         return WifiLine(lambda: SerialPort(name, packets.command(0, 0)))
     farewell = RESYNC.flush + ascii.stop().out

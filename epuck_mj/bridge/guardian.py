@@ -8,11 +8,13 @@ Run by its path, with nothing but the standard library: it has to be there at on
 """
 
 import contextlib
+import io
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 
 N_TIMES, PERIOD = 5, 0.2
 """How often it says so, and the time in between [s]: bytes may be lost."""
@@ -25,14 +27,20 @@ PATIENCE = 2.0
 """A guardian that does not go by then is killed [s]. Chosen."""
 
 
-def hire(port: int, farewell: bytes) -> subprocess.Popen | None:
-    """A guardian; None if there is nothing to say, or on Windows.
+def hire(fileno: Callable[[], int], farewell: bytes) -> subprocess.Popen | None:
+    """A guardian; None if there is nothing to say, or no descriptor to share.
+
+    Windows has none, nor have ports that are no files.
 
     Args:
-        port: file descriptor of the robot's port.
+        fileno: gives the file descriptor of the robot's port.
         farewell: bytes that stop the robot, whatever it heard before.
     """
     if not farewell or os.name != "posix":
+        return None
+    try:
+        port = fileno()
+    except io.UnsupportedOperation:
         return None
     return subprocess.Popen(
         [sys.executable, "-I", "-S", __file__, str(port), farewell.hex()],

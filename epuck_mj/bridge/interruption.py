@@ -10,8 +10,11 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self
 
-NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
-"""Ctrl-C, kill, a terminal that closes, Ctrl-Backslash: where the system has them."""
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
+"""Ctrl-C, kill, a terminal that closes, Ctrl-Backslash, Ctrl-Z: where there are such.
+
+Ctrl-Z would suspend who drives a robot, which would drive on: it ends things as well.
+"""
 
 SIGNALS = tuple(getattr(signal, name) for name in NAMES if hasattr(signal, name))
 

@@ -45,7 +45,7 @@ class SerialPort:
         Args:
             name: of the port.
             farewell: bytes that a guardian sends if this process dies with the port
-                open; nothing needs none. Windows has no guardians.
+                open; nothing needs none. Not all ports can have one.
 
         Raises:
             UserError: if that is not possible; says why.
@@ -61,7 +61,12 @@ class SerialPort:
             )
         except (OSError, ValueError, TypeError) as error:
             raise UserError(_why(name, error)) from None
-        self._guardian = guardian.hire(self._serial.fileno(), farewell)
+        self._guardian = None
+        try:
+            self._guardian = guardian.hire(self._serial.fileno, farewell)
+        except OSError as error:
+            self.close()
+            raise UserError(f"no guardian for '{name}': {error}") from None
 
     def send(self, data: bytes) -> None:
         """See Port."""

@@ -26,6 +26,8 @@ def log_name(name: Path | None) -> Path:
         name = FOLDER / f"robot-{datetime.now():%Y%m%d-%H%M%S}"
     elif name.suffix in (".npz", ".rrd"):
         name = name.with_suffix("")
+    if not name.name:
+        raise UserError(f"expected --log with the name of a file, got '{name}'")
     with writing(name.parent):
         name.parent.mkdir(parents=True, exist_ok=True)
     for path in _files(name):

@@ -9,7 +9,7 @@ from distributed import get_worker
 from epuck_mj.errors import UserError
 from epuck_mj.model import load_scene
 from evolution.config import ExperimentConfig
-from evolution.results import WHEELED_ROBOT
+from evolution.held_out import WHEELED_ROBOT
 
 DECIDING = ("epuck-mj", "mujoco", "numpy", "scipy", "contourpy", "cmaes")
 """Packages whose version decides over the bits."""

@@ -23,10 +23,10 @@ from evolution.gap.transfer import (
     verdict,
 )
 from evolution.gap.worlds import World, worlds
+from evolution.held_out import PLANAR_ROBOT, WHEELED_ROBOT
 from evolution.named_policies import NamedPolicy, named_policies
 from evolution.report.blocks import to_markdown
 from evolution.report.figures import save
-from evolution.results import PLANAR_ROBOT, WHEELED_ROBOT
 
 MODULE = "evolution.gap"
 WORLDS_MAX, STARTS_MAX = 1000, 1000

@@ -17,11 +17,11 @@ from epuck_mj.files import writing
 from epuck_mj.geometry import arena_box
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.recording import Trial, save_recording
+from evolution.held_out import WHEELED_ROBOT
 from evolution.named_policies import NamedPolicy, described, named_policies
 from evolution.replay.trials import from_file, labels, numbered_starts, simulated
 from evolution.replay.viewer import display_there, open_viewer
 from evolution.replay.web import LOOPBACK, server, write_page
-from evolution.results import WHEELED_ROBOT
 
 MODULE = "evolution.replay"
 

@@ -18,12 +18,13 @@ from evolution.report.blocks import (
     to_html,
     to_markdown,
 )
-from evolution.report.comparisons import PairRow, SuccessRow, pair_rows, success_rows
 from evolution.report.contests import comparisons, successes, targets
 from evolution.report.figures import figures, save
 from evolution.report.findings import behaviour, held_out_fitness, luck, rungs
 from evolution.report.frame import how_to_reproduce, what_was_run
 from evolution.report.ioh import export
+from evolution.report.pairs import PairRow, pair_rows
+from evolution.report.successes import SuccessRow, success_rows
 from evolution.report.summary import summary, summary_text
 from evolution.report.tables import TargetRow, csv_text, run_rows, target_rows
 from evolution.study_data import YARDSTICK, StudyData, load_study

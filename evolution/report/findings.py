@@ -2,17 +2,21 @@
 
 import numpy as np
 
-from epuck_mj.behaviour_classes import HUG
-from evolution.report.blocks import Block, Heading, Paragraph, Table
+from epuck_mj.behaviour_classes import HUG, MEANINGS
+from epuck_mj.metrics import FOLLOWING_SHARE
+from evolution.report.blocks import Block, Heading, Listing, Paragraph, Table
 from evolution.report.figures.style import YARDSTICK_LABEL, robot_name, with_runs
 from evolution.report.samples import (
     FEWEST_FOR_RANKS,
     class_means,
+    clearance,
     clearances,
     kept,
     known,
     most_believed,
     rank_correlation,
+    success_share,
+    successes,
     tests_of,
 )
 from evolution.report.tables import labels_of, shown_robots
@@ -154,12 +158,13 @@ def behaviour(data: StudyData) -> list[Block]:
                 *(percent(each.get(c, 0.0) if each else None) for c in seen),
                 spread(near, 1000),
                 f"{(near < HUG).sum()} of {near.size}",
+                _percent_median(successes(data, name, robot)),
             )
         )
     for robot in shown_robots(data):
         test = data.yardstick.get(robot, {})
         if test.get("behaviour"):
-            near = (test.get("metrics") or {}).get("clearance_mean")
+            near = clearance(test)
             rows.append(
                 (
                     YARDSTICK_LABEL,
@@ -167,6 +172,7 @@ def behaviour(data: StudyData) -> list[Block]:
                     *(percent(test["behaviour"].get(c, 0.0)) for c in seen),
                     NOTHING if near is None else f"{near * 1000:.1f}",
                     NOTHING,
+                    percent(success_share(test)),
                 )
             )
     return [
@@ -176,7 +182,15 @@ def behaviour(data: StudyData) -> list[Block]:
             "from shell to wall in mm, median [quartiles] over runs; champions whose "
             f"mean clearance is below {HUG * 1000:.0f} mm. A champion that rides so "
             "close is a reality gap in waiting: a real robot's sensors and wheels err "
-            "by more."
+            "by more. A trial has the first class that fits:"
+        ),
+        Listing([f"{name}: {MEANINGS[name]}" for name in MEANINGS if name in seen]),
+        Paragraph(
+            "Whole lap, median over runs: the share of trials without crash that go "
+            f"all round the arena, near walls in {FOLLOWING_SHARE:.0%} of the time "
+            "from the first on. Few trials have time for one: at top speed the 30 s "
+            "of the paper's experiments are 3.9 m, once round its arena is 3.5 m, and "
+            "the first wall has to be found."
         ),
         Table(
             (
@@ -185,6 +199,7 @@ def behaviour(data: StudyData) -> list[Block]:
                 *seen,
                 "clearance [mm]",
                 f"below {HUG * 1000:.0f} mm",
+                "whole lap",
             ),
             rows,
             texts=2,

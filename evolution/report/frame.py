@@ -1,11 +1,19 @@
 """The frame of a report: what was run and is missing, and how to get it again."""
 
+import numpy as np
+
 from evolution.report.blocks import Block, Code, Heading, Listing, Paragraph, Table
 from evolution.report.figures.style import robot_name, with_runs
 from evolution.report.samples import tests_of
 from evolution.report.summary import commands, config_differences
-from evolution.report.tables import labels_of, provenance, shown_robots
-from evolution.report.words import NOTHING, evaluations, seeds_text
+from evolution.report.tables import (
+    control_steps,
+    labels_of,
+    provenance,
+    shown_robots,
+)
+from evolution.report.words import NOTHING, evaluations, spread
+from evolution.study_config import seeds_text
 from evolution.study_data import StudyData
 
 
@@ -18,7 +26,6 @@ def what_was_run(data: StudyData) -> list[Block]:
         for name in runs
         for robot in data.robots
         for test in tests_of(data, name, robot)
-        if "starts" in test
     }
     n_starts = " or ".join(f"{n:,}" for n in sorted(starts)) or "the"
     blocks: list[Block] = [
@@ -33,14 +40,14 @@ def what_was_run(data: StudyData) -> list[Block]:
     if data.missing:
         blocks.append(Listing(data.missing))
     else:
-        blocks.append(Paragraph("Nothing: all runs that were begun are finished."))
+        blocks.append(Paragraph("Nothing: all runs that were asked for are finished."))
     if sizes[0] < 2:
         few = [labels[name] for name, each in runs.items() if len(each) < 2]
         blocks.append(
             Paragraph(
                 f"Only one run of {', '.join(few)}: one run has a value but says "
                 "nothing of the spread between runs, so there is no interval "
-                "(n = 1, no interval) and no verdict."
+                "and no verdict."
             )
         )
     blocks += [
@@ -54,7 +61,16 @@ def what_was_run(data: StudyData) -> list[Block]:
             f"the run; fitness is at most {data.steps}, the control steps of a trial."
         ),
         Table(
-            ("experiment", "name", "seeds", "n", "budget", "trials", "spent"),
+            (
+                "experiment",
+                "name",
+                "seeds",
+                "n",
+                "budget",
+                "trials",
+                "spent",
+                "control steps",
+            ),
             [
                 (
                     labels[name],
@@ -69,6 +85,7 @@ def what_was_run(data: StudyData) -> list[Block]:
                             default=None,
                         )
                     ),
+                    _steps(data, name),
                 )
                 for name, config in data.configs.items()
             ],
@@ -76,10 +93,17 @@ def what_was_run(data: StudyData) -> list[Block]:
         ),
         Paragraph(
             "Budget and spent are individual evaluations, each of that many trials; a "
-            "run spends whole generations only."
+            "run spends whole generations only. Control steps of a run are in "
+            f"millions, median [quartiles]; {data.steps} a trial at most, fewer for "
+            "robots that crash, and for those of DE that can only lose."
         ),
     ]
     return blocks
+
+
+def _steps(data: StudyData, name: str) -> str:
+    counted = [control_steps(run) for run in data.runs[name]]
+    return spread(np.array([steps for steps in counted if steps], float), 1e-6)
 
 
 def how_to_reproduce(data: StudyData, output: str, ioh: bool) -> list[Block]:

@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from evolution.report.tables import clearance
 from evolution.study_data import StudyData
+
+FOLLOWING = 0.9
+"""Least share of a champion's trials that follow a wall without crashing."""
 
 FEWEST_FOR_RANKS = 5
 """Runs below which a rank correlation says nothing: of 4, any order is common."""
@@ -24,9 +26,35 @@ def known(tests: list[Mapping[str, Any]], key: str) -> np.ndarray:
     return np.array([value for value in values if value is not None], float)
 
 
+def following_share(test: Mapping[str, Any]) -> float:
+    """Share of a champion's trials that followed walls, hugging them or not."""
+    shares = test["behaviour"]
+    return shares.get("wall follower", 0.0) + shares.get("hugger", 0.0)
+
+
+def clearance(test: Mapping[str, Any]) -> float | None:
+    """Mean clearance of a held-out evaluation [m], None if it does not say."""
+    return _metric(test, "clearance_mean")
+
+
+def success_share(test: Mapping[str, Any]) -> float | None:
+    """Share of its trials with a whole lap, likewise."""
+    return _metric(test, "success")
+
+
+def _metric(test: Mapping[str, Any], name: str) -> float | None:
+    return (test.get("metrics") or {}).get(name)
+
+
 def clearances(data: StudyData, name: str, robot: str) -> np.ndarray:
     """Mean clearance of each champion that was near a wall [m], `(n,)`."""
     values = [clearance(test) for test in tests_of(data, name, robot)]
+    return np.array([value for value in values if value is not None], float)
+
+
+def successes(data: StudyData, name: str, robot: str) -> np.ndarray:
+    """Share of each champion's trials with a whole lap, `(n,)`."""
+    values = [success_share(test) for test in tests_of(data, name, robot)]
     return np.array([value for value in values if value is not None], float)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from epuck_mj.behaviour_classes import HUG
 from evolution.config import ExperimentConfig
-from evolution.report.comparisons import pair_rows, success_rows
 from evolution.report.figures.style import with_runs
+from evolution.report.pairs import pair_rows
 from evolution.report.samples import (
     class_means,
     clearances,
@@ -21,6 +21,7 @@ from evolution.report.samples import (
     rank_correlation,
     tests_of,
 )
+from evolution.report.successes import success_rows
 from evolution.report.tables import (
     labels_of,
     provenance,

@@ -3,7 +3,7 @@
 import csv
 import io
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from epuck_mj.errors import UserError
-from evolution.report.claims import following_share
+from evolution.held_out import WHEELED_ROBOT
 from evolution.report.figures.curves import TARGET_SHARES, hits
 from evolution.report.figures.style import looks, with_runs
-from evolution.results import WHEELED_ROBOT
+from evolution.report.samples import clearance, following_share, success_share
 from evolution.run_directory import RunDirectory
 from evolution.study_data import RunData, StudyData
 from evolution.targets import expected_running_time_interval
@@ -60,7 +60,8 @@ def run_rows(data: StudyData) -> list[dict[str, Any]]:
 
     `<robot> ...` is the held-out evaluation on that robot: fitness of the test starts,
     bootstrap 95 % interval of its mean, mean of the worst 5 %, crashes per trial and
-    per minute, share of trials that follow a wall, clearance [m].
+    per minute, share of trials that follow a wall, clearance [m], share of trials with
+    a whole lap.
     """
     return [
         _run_row(data, name, run)
@@ -84,6 +85,7 @@ def _run_row(data: StudyData, name: str, run: RunData) -> dict[str, Any]:
             "collisions_per_minute": test.get("collisions_per_minute"),
             "following": following_share(test) if test.get("behaviour") else None,
             "clearance_mean": clearance(test),
+            "success": success_share(test),
             "starts": test.get("starts"),
         }
         row |= {f"{robot} {column}": value for column, value in columns.items()}
@@ -92,20 +94,15 @@ def _run_row(data: StudyData, name: str, run: RunData) -> dict[str, Any]:
         "validation": run.champion.scores.get("validation"),
         "best_stored": float(run.history["best"].max()),
         "evaluations": int(run.history["evaluations"][-1]),
-        "control_steps": _control_steps(RunDirectory(run.path)),
+        "control_steps": control_steps(run),
         "path": run.path.as_posix(),
     }
 
 
-def clearance(test: Mapping[str, Any]) -> float | None:
-    """Mean clearance of a held-out evaluation [m], None if it does not say."""
-    return (test.get("metrics") or {}).get("clearance_mean")
-
-
-def _control_steps(directory: RunDirectory) -> int | None:
+def control_steps(run: RunData) -> int | None:
     """Control steps that a run took, None if it did not count them."""
     try:
-        with directory.timing.open(encoding="utf-8", newline="") as file:
+        with RunDirectory(run.path).timing.open(encoding="utf-8", newline="") as file:
             rows = csv.DictReader(file)
             # a generation that was done twice counts once
             steps = {row["generation"]: int(row["control_steps"]) for row in rows}

@@ -2,7 +2,6 @@
 
 import math
 import shlex
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -22,10 +21,19 @@ def spread(sample: np.ndarray, scale: float = 1.0, form: str = ".1f") -> str:
     return f"{found.median:{form}} [{found.lower:{form}}, {found.upper:{form}}]"
 
 
+def median_and_quartiles(sample: np.ndarray, unit: str = "") -> str:
+    """The same for a sentence."""
+    found = quartiles(sample)
+    text = f"median {found.median:.1f}{unit}"
+    if sample.size == 1:
+        return text
+    return f"{text} (quartiles {found.lower:.1f} and {found.upper:.1f})"
+
+
 def between(low: float, high: float, form: str = ".2f") -> str:
     """An interval, or that there is none."""
     if math.isnan(low) or math.isnan(high):
-        return "(n = 1, no interval)"
+        return "(too few runs for an interval)"
     return f"[{low:{form}}, {high:{form}}]"
 
 
@@ -41,23 +49,7 @@ def probability(p: float) -> str:
 
 def evaluations(n: float | None) -> str:
     """A number of evaluations."""
-    if n is None or math.isnan(n):
-        return NOTHING
-    return "never" if math.isinf(n) else f"{n:,.0f}"
-
-
-def seeds_text(seeds: Sequence[int]) -> str:
-    """Ascending seeds as the command line takes them: 1-3,7."""
-    groups: list[list[int]] = []
-    for seed in seeds:
-        if groups and seed == groups[-1][-1] + 1:
-            groups[-1].append(seed)
-        else:
-            groups.append([seed])
-    return ",".join(
-        str(group[0]) if len(group) == 1 else f"{group[0]}-{group[-1]}"
-        for group in groups
-    )
+    return NOTHING if n is None else f"{n:,.0f}"
 
 
 def command_line(module: str, *arguments: str) -> str:

@@ -123,6 +123,8 @@ def _check(options: Options) -> None:
         raise UserError(f"expected --speed above 0, up to 1000, got {options.speed}")
     if not 0 <= options.latency <= 1:
         raise UserError(f"expected --latency from 0 to 1 s, got {options.latency}")
+    if options.seed < 0:
+        raise UserError(f"expected --seed of 0 or more, got {options.seed}")
     if not all(map(math.isfinite, options.pose)):
         raise UserError(f"expected --pose of finite numbers, got {options.pose}")
 

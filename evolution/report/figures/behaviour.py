@@ -17,6 +17,7 @@ from epuck_mj.trajectory import record
 from evolution.champion import starts_for_test
 from evolution.config import ExperimentConfig
 from evolution.figures import trajectory_figure
+from evolution.held_out import WHEELED_ROBOT
 from evolution.report.figures.style import (
     PAGE,
     PAPERS,
@@ -30,7 +31,6 @@ from evolution.report.figures.style import (
     robot_panels,
     with_runs,
 )
-from evolution.results import WHEELED_ROBOT
 from evolution.study_data import RunData, StudyData
 
 N_STARTS = 2

@@ -14,6 +14,7 @@ from evolution.report.figures.style import (
     PRINT,
     YARDSTICK_LABEL,
     YARDSTICK_LOOK,
+    YARDSTICK_SHORT,
     Look,
     counted,
     counts,
@@ -45,10 +46,13 @@ def stored_and_held_out(data: StudyData) -> tuple[Figure, str]:
     width = max(COLUMN, PAGE * columns / MOST_COLUMNS)
     figure = Figure(figsize=(width, 0.4 + 2 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
+    reference = yardstick(data, data.robots[0])
     for axes in grid.flat[len(runs) :]:
         axes.remove()
     for axes, (name, each) in zip(grid.flat, runs.items(), strict=False):
         _draw_luck(axes, data, name, styles[name])
+        if reference is not None:
+            axes.axhline(reference, **YARDSTICK_LOOK, zorder=1)
         axes.set_title(counted(styles[name], len(each)))
         axes.set(ylim=(0, data.steps), xlabel="runs, in order of stored fitness")
     for axes in grid[:, 0]:
@@ -58,12 +62,18 @@ def stored_and_held_out(data: StudyData) -> tuple[Figure, str]:
     for robot in data.robots:
         fill = "0.3" if robot == data.robots[0] else "white"
         lines[f"held-out, {robot_name(robot)}"] = Line2D([], [], mfc=fill, **dot)
+    if reference is not None:
+        lines[YARDSTICK_SHORT] = Line2D([], [], **YARDSTICK_LOOK)
     legend_below(figure, lines)
     caption = (
         f"Stored and held-out fitness of each champion ({counts(data)}). The black "
         "bar is what evolution believed of it; the vertical distance from there down "
         f"to a dot is the luck that it kept. {CHAMPION}"
     )
+    if reference is not None:
+        caption += (
+            f" Dashed: the {YARDSTICK_LABEL} on the {robot_name(data.robots[0])}."
+        )
     return figure, caption
 
 
@@ -90,7 +100,8 @@ def held_out(data: StudyData) -> tuple[Figure, str]:
         f"(tick) and the interquartile range (bar). {CHAMPION}"
     )
     if YARDSTICK_LABEL in lines:
-        caption += f" Dashed: the {YARDSTICK_LABEL} on the same starts."
+        robot = robot_name(data.robots[0])
+        caption += f" Dashed: the {YARDSTICK_LABEL}, held-out on the {robot}."
     return figure, caption
 
 
@@ -111,6 +122,10 @@ def rungs(data: StudyData) -> tuple[Figure, str] | None:
         lines[counted(styles[name], len(each))] = Line2D(
             [], [], color=styles[name].color, ls="", marker=styles[name].marker, ms=4
         )
+    x, y = yardstick(data, first), yardstick(data, last)
+    if x is not None and y is not None:
+        axes.plot(x, y, "+", color="black", ms=9, mew=1.2, zorder=2)
+        lines[YARDSTICK_LABEL] = Line2D([], [], color="black", ls="", marker="+", ms=7)
     axes.set(
         xlim=(0, data.steps),
         ylim=(0, data.steps),

@@ -95,12 +95,13 @@ def fitness(data: StudyData, name: str) -> tuple[Figure, str]:
         line = _median_and_band(axes, grid, values, color)
         line.set(linestyle=dashes)
         lines[f"population {column}"] = line
+    of_yardstick = _draw_yardstick(axes, data, lines)
     _stored_axes(axes, data, grid[-1])
     legend_below(figure, lines, title=counted(look, len(runs)))
     caption = (
         f"{look.label}: stored fitness of the best of the population and its mean "
         "against evaluations. Median and interquartile range over runs "
-        f"(n = {len(runs)}); thin: the single runs. {STORED}"
+        f"(n = {len(runs)}); thin: the single runs. {STORED}{of_yardstick}"
     )
     return figure, caption
 
@@ -127,21 +128,13 @@ def fitness_all(data: StudyData) -> tuple[Figure, str]:
         _mark(line, styles[name], grid.size, i, len(runs))
         lines[counted(styles[name], len(each))] = line
         last = max(last, grid[-1])
-    reference = yardstick(data, data.robots[0])
-    if reference is not None:
-        line = axes.axhline(reference, **YARDSTICK_LOOK)
-        lines[YARDSTICK_SHORT] = line
+    of_yardstick = _draw_yardstick(axes, data, lines)
     _stored_axes(axes, data, last)
     legend_below(figure, lines)
     caption = (
         "Best stored fitness so far against evaluations: median and interquartile "
-        f"range over runs ({counts(data)}). {STORED}"
+        f"range over runs ({counts(data)}). {STORED}{of_yardstick}"
     )
-    if reference is not None:
-        caption += (
-            f" Dashed: held-out fitness of the {YARDSTICK_LABEL} on the "
-            f"{robot_name(data.robots[0])}, which has no stored fitness."
-        )
     return figure, caption
 
 
@@ -194,6 +187,19 @@ def _median_and_band(axes: Axes, grid: np.ndarray, values: np.ndarray, color) ->
         axes.fill_between(grid, low, high, color=color, alpha=0.2, lw=0)
     (line,) = axes.plot(grid, median, color=color, lw=1.4)
     return line
+
+
+def _draw_yardstick(axes: Axes, data: StudyData, lines: dict[str, Line2D]) -> str:
+    """The hand-written follower's line, if it was tested, and a caption's words."""
+    robot = data.robots[0]
+    reference = yardstick(data, robot)
+    if reference is None:
+        return ""
+    lines[YARDSTICK_SHORT] = axes.axhline(reference, **YARDSTICK_LOOK)
+    return (
+        f" Dashed: held-out fitness of the {YARDSTICK_LABEL} on the "
+        f"{robot_name(robot)}, which has no stored fitness."
+    )
 
 
 def _mark(line: Line2D, look: Look, size: int, i: int, n: int) -> None:
