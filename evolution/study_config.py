@@ -189,5 +189,21 @@ def seeds_text(seeds: Sequence[int]) -> str:
     )
 
 
+def seeds_to_yaml(seeds: Mapping[str, Sequence[int]]) -> str:
+    """Ascending seeds of experiments by name, as `seeds_from_yaml` reads them."""
+    texts = {name: seeds_text(each) for name, each in seeds.items()}
+    return yaml.safe_dump(texts, sort_keys=False)
+
+
+def seeds_from_yaml(path: Path) -> dict[str, list[int]]:
+    """What `seeds_to_yaml` wrote to a file.
+
+    Raises:
+        UserError: if it is damaged.
+    """
+    stored = read_mapping(path)
+    return {str(name): parse_seeds(str(text)) for name, text in stored.items()}
+
+
 SEEDS = re.compile(r"(\d{1,18})(?:-(\d{1,18}))?", re.ASCII)
 SEEDS_MAX = 10_000

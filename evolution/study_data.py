@@ -72,6 +72,15 @@ class StudyData:
     yardstick: Mapping[str, Mapping]
     missing: tuple[str, ...]
 
+    @property
+    def with_runs(self) -> dict[str, tuple[RunData, ...]]:
+        """The runs of the experiments that have any, in the study's order."""
+        return {name: self.runs[name] for name in self.configs if self.runs.get(name)}
+
+    def yardstick_mean(self, robot: str) -> float | None:
+        """Held-out fitness of the hand-written wall follower, None if not known."""
+        return self.yardstick.get(robot, {}).get("mean")
+
     def held_out(self, name: str, robot: str) -> np.ndarray:
         """Held-out fitness of an experiment's champions, `(runs,)`."""
         return np.array([run.held_out(robot) for run in self.runs[name]])

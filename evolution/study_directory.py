@@ -3,13 +3,10 @@
 from collections.abc import Collection
 from pathlib import Path
 
-import yaml
-
 from epuck_mj import files
 from epuck_mj.errors import UserError
-from evolution.config import read_mapping
 from evolution.run_directory import LOCK, RunDirectory, locked
-from evolution.study_config import StudyConfig, parse_seeds, seeds_text
+from evolution.study_config import StudyConfig, seeds_from_yaml, seeds_to_yaml
 
 PREFIX = "seed-"
 
@@ -62,8 +59,7 @@ class StudyDirectory:
         """
         if not files.is_file(self.asked):
             return {}
-        stored = read_mapping(self.asked)
-        return {str(name): parse_seeds(str(text)) for name, text in stored.items()}
+        return seeds_from_yaml(self.asked)
 
     def open(self, config: StudyConfig, seeds: Collection[int]) -> None:
         """Make the directory, or go on with it; experiments and seeds may join.
@@ -88,8 +84,7 @@ class StudyDirectory:
                 if files.is_file(self.config):
                     config = self.stored_config().merged(config, self.path)
                 files.write_text(self.config, config.to_yaml())
-                texts = {name: seeds_text(each) for name, each in asked.items()}
-                files.write_text(self.asked, yaml.safe_dump(texts, sort_keys=False))
+                files.write_text(self.asked, seeds_to_yaml(asked))
 
     def _holds_anything(self) -> bool:
         """Whether more is there than what a killed writer left behind."""

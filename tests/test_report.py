@@ -30,9 +30,8 @@ from evolution.report.blocks import (
     to_markdown,
 )
 from evolution.report.command import report, tables
-from evolution.report.figures.curves import TARGET_SHARES
 from evolution.report.pairs import compared, pair_rows
-from evolution.report.samples import rank_correlation
+from evolution.report.samples import TARGET_SHARES, rank_correlation
 from evolution.report.successes import BEATS, FOLLOWS, success_rows
 from evolution.report.summary import summary, summary_text
 from evolution.report.tables import csv_text, run_rows, target_rows

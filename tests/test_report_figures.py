@@ -26,7 +26,6 @@ from evolution.report.figures.behaviour import (
 from evolution.report.figures.champions import held_out, rungs, stored_and_held_out
 from evolution.report.figures.curves import (
     N_POINTS,
-    TARGET_SHARES,
     common_grid,
     fitness,
     fitness_all,
@@ -34,6 +33,8 @@ from evolution.report.figures.curves import (
     targets,
 )
 from evolution.report.figures.style import LOOKS, looks
+from evolution.report.samples import TARGET_SHARES
+from evolution.report.words import label
 from evolution.study_data import RunData, StudyData
 
 ROBOTS = ("epuck_planar", "epuck")
@@ -159,7 +160,7 @@ def test_fitness_shows_medians_bands_and_every_run(data, name):
     assert "Dashed: held-out fitness of the hand-written wall follower" in caption
     assert len(bands) == (2 if n > 1 else 0)
     assert axes.get_ylabel() == "stored fitness (max 300)"
-    assert f"{looks(data)[name].label} (n = {n})" in legend_texts(figure)
+    assert f"{label(name)} (n = {n})" in legend_texts(figure)
     assert f"n = {n}" in caption and "stored fitness" in caption
 
 
@@ -223,7 +224,7 @@ def test_stored_and_held_out_shows_every_run_in_order_of_stored_fitness(data):
             np.testing.assert_array_equal(test[:, 1], data.held_out(name, robot)[order])
         (luck,) = collections(axes, LineCollection)
         assert len(luck.get_segments()) == N_RUNS[name]
-        assert axes.get_title() == f"{looks(data)[name].label} (n = {N_RUNS[name]})"
+        assert axes.get_title() == f"{label(name)} (n = {N_RUNS[name]})"
     assert "held-out, wheeled robot" in legend_texts(figure)
     assert "GA (n = 2)" in caption
 

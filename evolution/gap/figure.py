@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 
 from epuck_mj.colors import TRIALS
 from evolution.gap.transfer import SHARE_KEPT, Transfer
-from evolution.report.figures.style import PAGE, PRINT, ROBOTS, color
+from evolution.report.figures.style import PAGE, PRINT, color
+from evolution.report.words import ROBOTS
 
 LINES = ("-", (0, (7, 2)), (0, (2, 1.5)), (0, (7, 1.5, 1.2, 1.5)))
 

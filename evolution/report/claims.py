@@ -17,7 +17,7 @@ from evolution.report.verdicts import (
     of_most,
     of_order,
 )
-from evolution.report.words import median_and_quartiles
+from evolution.report.words import PAPERS, label, median_and_quartiles
 from evolution.study_config import StudyConfig, find_study
 from evolution.study_data import StudyData
 
@@ -29,8 +29,6 @@ PAPER_BEST = {"de-best": 246.66, "de-rand": 215.217, "ga": 202.775}
 
 REPLICATES = 3
 """Runs of which that is the best: "at least three"; of more it would be rarer low."""
-
-DISPLAY = {"de-best": "DE/best/1/bin", "de-rand": "DE/rand/1/bin", "ga": "GA"}
 
 NEAR = 2 / 3
 """Share of the best from which on a mean has approached it: our reading."""
@@ -71,7 +69,7 @@ def claims(study: StudyData) -> list[Claim]:
         _stays_apart(shares),
         *_orders(shares, "in the mean's share of the best")[1:],
         *(_mature_early(early, name) for name in ("de-best", "de-rand")),
-        *(_follows(study, name) for name in DISPLAY),
+        *(_follows(study, name) for name in PAPERS),
     ]
     return _of_the_paper(study, found)
 
@@ -86,7 +84,7 @@ def unlike(study: StudyData) -> list[str]:
     """What makes experiments others than the paper's, a line each; robots are free."""
     shipped = StudyConfig.load(find_study(PAPER)).experiments
     lines = []
-    for name in DISPLAY:
+    for name in PAPERS:
         if name in study.configs:
             config = study.configs[name]
             free = {"seed": config.seed, "robot": config.robot}
@@ -128,7 +126,7 @@ def _samples(
 ) -> dict[str, np.ndarray]:
     """A sample per algorithm of the paper; empty where the study has none."""
     return {
-        name: value(name) if study.runs.get(name) else np.zeros(0) for name in DISPLAY
+        name: value(name) if study.runs.get(name) else np.zeros(0) for name in PAPERS
     }
 
 
@@ -146,7 +144,7 @@ def _orders(samples: dict[str, np.ndarray], where: str) -> list[Claim]:
     found = []
     for pair in (("de-best", "de-rand"), ("de-best", "ga"), ("de-rand", "ga")):
         better, worse = pair
-        text = f"{DISPLAY[better]} exceeds {DISPLAY[worse]} {where}"
+        text = f"{label(better)} exceeds {label(worse)} {where}"
         n = f"{samples[better].size} and {samples[worse].size}"
         row = rows.get(pair)
         if row is None:
@@ -159,12 +157,12 @@ def _orders(samples: dict[str, np.ndarray], where: str) -> list[Claim]:
 def _maximum(stored: dict[str, np.ndarray], name: str) -> Claim:
     """Whether the paper's maximum has a place among those of our runs."""
     sample, paper = stored[name], PAPER_BEST[name]
-    text = f"{DISPLAY[name]} reaches a maximum fitness of {paper}"
+    text = f"{label(name)} reaches a maximum fitness of {paper}"
     return _claim(text, sample, lambda: of_best(sample, paper, REPLICATES))
 
 
 def _approaches(shares: dict[str, np.ndarray], name: str) -> Claim:
-    text = f"{DISPLAY[name]}'s mean approaches its best (read as: above two thirds)"
+    text = f"{label(name)}'s mean approaches its best (read as: above two thirds)"
     sample = shares[name]
     return _claim(text, sample, lambda: of_most(sample > 100 * NEAR), "final share")
 
@@ -177,7 +175,7 @@ def _stays_apart(shares: dict[str, np.ndarray]) -> Claim:
 
 def _mature_early(early: dict[str, np.ndarray], name: str) -> Claim:
     text = (
-        f"{DISPLAY[name]} has mature individuals early (read as: {MATURE:.0%} of its "
+        f"{label(name)} has mature individuals early (read as: {MATURE:.0%} of its "
         f"final best within {EARLY:.0%} of the budget)"
     )
     sample = early[name]
@@ -187,7 +185,7 @@ def _mature_early(early: dict[str, np.ndarray], name: str) -> Claim:
 def _follows(study: StudyData, name: str) -> Claim:
     """Finds a wall, follows it, does not crash: on wheels."""
     text = (
-        f"{DISPLAY[name]}'s champion finds a wall and follows it without crashing "
+        f"{label(name)}'s champion finds a wall and follows it without crashing "
         f"(read as: {FOLLOWING:.0%} of its trials on {WHEELED_ROBOT} are a wall "
         "follower's or a hugger's)"
     )

@@ -4,25 +4,30 @@ from collections.abc import Sequence
 
 from evolution.comparisons import FEWEST_FOR_STARS
 from evolution.report.blocks import Block, Heading, Listing, Paragraph, Table
-from evolution.report.figures.style import YARDSTICK_LABEL, robot_name, with_runs
 from evolution.report.pairs import PairRow, compared, pair_rows
 from evolution.report.samples import FOLLOWING
 from evolution.report.successes import BEATS, FOLLOWS, SuccessRow, success_rows
 from evolution.report.tables import (
     TargetRow,
     held_out_measure,
-    labels_of,
     shown_robots,
     target_rows,
 )
-from evolution.report.words import between, evaluations, probability
+from evolution.report.words import (
+    YARDSTICK_LABEL,
+    between,
+    evaluations,
+    label,
+    probability,
+    robot_name,
+)
 from evolution.statistics import FEWEST_FOR_INTERVAL
 from evolution.study_data import StudyData
 
 
 def comparisons(data: StudyData) -> list[Block]:
     """Pairs of experiments, in words for the first robot and in tables for all."""
-    labels, rows = labels_of(data), pair_rows(data)
+    rows = pair_rows(data)
     blocks: list[Block] = [Heading("Comparisons")]
     if not rows:
         return [*blocks, Paragraph("One experiment with runs: nothing to compare.")]
@@ -40,12 +45,12 @@ def comparisons(data: StudyData) -> list[Block]:
     own = [row for row in rows if row.measure == held_out_measure(first)]
     blocks += [
         Paragraph(f"In held-out fitness on the {robot_name(first)}:"),
-        Listing([compared(row, labels[row.a], labels[row.b]) for row in own]),
+        Listing([compared(row, label(row.a), label(row.b)) for row in own]),
     ]
     for measure in dict.fromkeys(row.measure for row in rows):
         blocks += [
             Heading(_measure_title(measure, data), 3),
-            _pair_table([row for row in rows if row.measure == measure], labels),
+            _pair_table([row for row in rows if row.measure == measure]),
         ]
     return blocks
 
@@ -58,14 +63,14 @@ def _measure_title(measure: str, data: StudyData) -> str:
     return titles.get(measure, "Stored fitness, what evolution believes")
 
 
-def _pair_table(rows: Sequence[PairRow], labels: dict[str, str]) -> Table:
+def _pair_table(rows: Sequence[PairRow]) -> Table:
     columns = ("first", "second", "n", "medians", "difference", "A12", "p", "Holm", "")
     return Table(
         columns,
         [
             (
-                labels[row.a],
-                labels[row.b],
+                label(row.a),
+                label(row.b),
                 f"{row.n_a}, {row.n_b}",
                 f"{row.median_a:.1f}, {row.median_b:.1f}",
                 f"{row.median_difference:.1f} "
@@ -83,7 +88,7 @@ def _pair_table(rows: Sequence[PairRow], labels: dict[str, str]) -> Table:
 
 def successes(data: StudyData) -> list[Block]:
     """Shares of runs that meet a criterion; nothing if the data have none."""
-    labels, rows = labels_of(data), success_rows(data)
+    rows = success_rows(data)
     blocks: list[Block] = [Heading("Success")]
     meanings = {
         BEATS: f"held-out mean of at least the {YARDSTICK_LABEL}'s on the same "
@@ -103,7 +108,7 @@ def successes(data: StudyData) -> list[Block]:
             continue
         blocks += [
             Paragraph(f"A run {criterion}: {meaning}. Share with Wilson 95 % bounds."),
-            _success_table(found, labels),
+            _success_table(found),
         ]
         pairs = [row for row in found if row.fisher_p_holm is not None]
         if pairs:
@@ -112,26 +117,26 @@ def successes(data: StudyData) -> list[Block]:
                     "Fisher's exact test of each pair, Holm-adjusted within a robot's "
                     f"{pairs[0].family}; below {FEWEST_FOR_STARS} runs no verdict:"
                 ),
-                Listing([_fisher(row, labels) for row in pairs]),
+                Listing([_fisher(row) for row in pairs]),
             ]
     return blocks
 
 
-def _fisher(row: SuccessRow, labels: dict[str, str]) -> str:
+def _fisher(row: SuccessRow) -> str:
     return (
-        f"{labels[row.experiment]} and {labels[row.other or '']}, "
+        f"{label(row.experiment)} and {label(row.other or '')}, "
         f"{robot_name(row.robot)}: {row.successes} of {row.n} and "
         f"{row.other_successes} of {row.other_n}, Holm "
         f"p {probability(row.fisher_p_holm or 0.0)}"
     )
 
 
-def _success_table(rows: Sequence[SuccessRow], labels: dict[str, str]) -> Table:
+def _success_table(rows: Sequence[SuccessRow]) -> Table:
     return Table(
         ("experiment", "robot", "runs", "share"),
         [
             (
-                labels[row.experiment],
+                label(row.experiment),
                 robot_name(row.robot),
                 f"{row.successes} of {row.n}",
                 f"{row.share:.0%} [{row.low:.0%}, {row.high:.0%}]",
@@ -145,7 +150,7 @@ def _success_table(rows: Sequence[SuccessRow], labels: dict[str, str]) -> Table:
 
 def targets(data: StudyData) -> list[Block]:
     """What each target cost."""
-    labels, rows = labels_of(data), target_rows(data)
+    rows = target_rows(data)
     goals = dict.fromkeys(row.target for row in rows)
     found = {(row.experiment, row.target): row for row in rows}
     return [
@@ -160,8 +165,8 @@ def targets(data: StudyData) -> list[Block]:
         Table(
             ("experiment", *(f"{goal:g}" for goal in goals)),
             [
-                (labels[name], *(_cost(found[name, goal]) for goal in goals))
-                for name in with_runs(data)
+                (label(name), *(_cost(found[name, goal]) for goal in goals))
+                for name in data.with_runs
             ],
         ),
     ]

@@ -5,7 +5,6 @@ import numpy as np
 from epuck_mj.behaviour_classes import HUG, MEANINGS
 from epuck_mj.metrics import FOLLOWING_SHARE
 from evolution.report.blocks import Block, Heading, Listing, Paragraph, Table
-from evolution.report.figures.style import YARDSTICK_LABEL, robot_name, with_runs
 from evolution.report.samples import (
     FEWEST_FOR_RANKS,
     class_means,
@@ -19,17 +18,24 @@ from evolution.report.samples import (
     successes,
     tests_of,
 )
-from evolution.report.tables import labels_of, shown_robots
-from evolution.report.words import NOTHING, percent, spread
+from evolution.report.tables import shown_robots
+from evolution.report.words import (
+    NOTHING,
+    YARDSTICK_LABEL,
+    label,
+    percent,
+    robot_name,
+    spread,
+)
 from evolution.study_data import StudyData
 
 
 def held_out_fitness(data: StudyData) -> list[Block]:
     """The main table: held-out fitness first."""
-    robots, labels = shown_robots(data), labels_of(data)
+    robots = shown_robots(data)
     rows = []
-    for name, runs in with_runs(data).items():
-        row = [labels[name], str(len(runs))]
+    for name, runs in data.with_runs.items():
+        row = [label(name), str(len(runs))]
         for robot in robots:
             sample = data.held_out(name, robot)
             crashes = known(tests_of(data, name, robot), "crash_rate")
@@ -62,14 +68,14 @@ def rungs(data: StudyData) -> list[Block]:
     """How champions keep their fitness from robot to robot; nothing for one robot."""
     if len(data.robots) < 2:
         return []
-    labels, (first, last) = labels_of(data), (data.robots[0], data.robots[-1])
+    first, last = data.robots[0], data.robots[-1]
     rows = []
-    for name, runs in with_runs(data).items():
+    for name, runs in data.with_runs.items():
         a, b = data.held_out(name, first), data.held_out(name, last)
         rank = rank_correlation(a, b)
         rows.append(
             (
-                labels[name],
+                label(name),
                 str(len(runs)),
                 spread(a),
                 spread(b),
@@ -92,14 +98,14 @@ def rungs(data: StudyData) -> list[Block]:
 
 def luck(data: StudyData) -> list[Block]:
     """What stored fitness promised and fresh starts did not keep."""
-    labels, robot = labels_of(data), data.robots[0]
+    robot = data.robots[0]
     rows = []
-    for name, runs in with_runs(data).items():
+    for name, runs in data.with_runs.items():
         stored, held_out = data.stored(name), data.held_out(name, robot)
         believed, worth = most_believed(data, name)
         rows.append(
             (
-                labels[name],
+                label(name),
                 str(len(runs)),
                 spread(stored),
                 spread(held_out),
@@ -135,11 +141,10 @@ def luck(data: StudyData) -> list[Block]:
 
 def behaviour(data: StudyData) -> list[Block]:
     """What champions do, and how close to the wall they ride."""
-    labels = labels_of(data)
     shares = {
         (name, robot): class_means(data, name, robot)
         for robot in shown_robots(data)
-        for name in with_runs(data)
+        for name in data.with_runs
     }
     classes = dict.fromkeys(name for each in shares.values() for name in each)
     seen = [c for c in classes if any(each.get(c) for each in shares.values())]
@@ -153,7 +158,7 @@ def behaviour(data: StudyData) -> list[Block]:
         near = clearances(data, name, robot)
         rows.append(
             (
-                labels[name],
+                label(name),
                 robot_name(robot),
                 *(percent(each.get(c, 0.0) if each else None) for c in seen),
                 spread(near, 1000),

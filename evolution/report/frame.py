@@ -3,23 +3,21 @@
 import numpy as np
 
 from evolution.report.blocks import Block, Code, Heading, Listing, Paragraph, Table
-from evolution.report.figures.style import robot_name, with_runs
 from evolution.report.samples import tests_of
 from evolution.report.summary import commands, config_differences
 from evolution.report.tables import (
     control_steps,
-    labels_of,
     provenance,
     shown_robots,
 )
-from evolution.report.words import NOTHING, evaluations, spread
+from evolution.report.words import NOTHING, evaluations, label, robot_name, spread
 from evolution.study_config import seeds_text
 from evolution.study_data import StudyData
 
 
 def what_was_run(data: StudyData) -> list[Block]:
     """Title, what is missing, and the experiments."""
-    labels, runs = labels_of(data), with_runs(data)
+    runs = data.with_runs
     sizes = sorted({len(each) for each in runs.values()})
     starts = {
         test["starts"]
@@ -42,7 +40,7 @@ def what_was_run(data: StudyData) -> list[Block]:
     else:
         blocks.append(Paragraph("Nothing: all runs that were asked for are finished."))
     if sizes[0] < 2:
-        few = [labels[name] for name, each in runs.items() if len(each) < 2]
+        few = [label(name) for name, each in runs.items() if len(each) < 2]
         blocks.append(
             Paragraph(
                 f"Only one run of {', '.join(few)}: one run has a value but says "
@@ -73,7 +71,7 @@ def what_was_run(data: StudyData) -> list[Block]:
             ),
             [
                 (
-                    labels[name],
+                    label(name),
                     name,
                     seeds_text([run.seed for run in data.runs[name]]) or NOTHING,
                     str(len(data.runs[name])),
@@ -108,7 +106,7 @@ def _steps(data: StudyData, name: str) -> str:
 
 def how_to_reproduce(data: StudyData, output: str, ioh: bool) -> list[Block]:
     """Files, commands, and where the runs came from."""
-    came_from, labels = provenance(data), labels_of(data)
+    came_from = provenance(data)
     blocks: list[Block] = [
         Heading("How to get every number again"),
         Listing(
@@ -145,7 +143,7 @@ def how_to_reproduce(data: StudyData, output: str, ioh: bool) -> list[Block]:
         blocks += [
             Paragraph("The experiments differ in these keys:"),
             Table(
-                ("key", *(labels[name] for name in names)),
+                ("key", *(label(name) for name in names)),
                 [
                     (key, *(str(values.get(name, NOTHING)) for name in names))
                     for key, values in differences.items()

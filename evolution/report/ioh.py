@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from epuck_mj.files import write_text
-from evolution.report.figures.style import looks, with_runs
+from evolution.report.words import label
 from evolution.study_data import RunData, StudyData
 
 FUNCTION_ID, FUNCTION = 1, "WallFollowing"
@@ -52,7 +52,7 @@ def export(data: StudyData, folder: Path) -> None:
     """
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / "README.md", README)
-    for name, runs in with_runs(data).items():
+    for name, runs in data.with_runs.items():
         genes = data.configs[name].network.n_genes
         path = (
             f"data_f{FUNCTION_ID}_{FUNCTION}/IOHprofiler_f{FUNCTION_ID}_DIM{genes}.dat"
@@ -64,7 +64,7 @@ def export(data: StudyData, folder: Path) -> None:
             "function_id": FUNCTION_ID,
             "function_name": FUNCTION,
             "maximization": True,
-            "algorithm": {"name": name, "info": looks(data)[name].label},
+            "algorithm": {"name": name, "info": label(name)},
             "attributes": list(HEADER),
             "scenarios": [
                 {

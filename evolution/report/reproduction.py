@@ -21,8 +21,8 @@ from evolution.report.claims import (
 )
 from evolution.report.first_generation import FirstGeneration
 from evolution.report.samples import kept, most_believed
-from evolution.report.tables import labels_of, shown_robots
-from evolution.report.words import median_and_quartiles, spread
+from evolution.report.tables import shown_robots
+from evolution.report.words import label, median_and_quartiles, spread
 from evolution.study_config import StudyConfig, find_study
 from evolution.study_data import YARDSTICK, StudyData
 
@@ -152,12 +152,12 @@ def reproduction(
 
 def runs_table(study: StudyData) -> Table:
     """Held-out fitness first, then stored, of every experiment with runs."""
-    labels, robots = labels_of(study), shown_robots(study)
+    robots = shown_robots(study)
     columns = ["algorithm", "n", "evaluations"]
     columns += [f"held-out, {robot}" for robot in robots]
     rows = [
         [
-            labels[name],
+            label(name),
             str(len(runs)),
             f"{study.configs[name].evaluations:,}",
             *(spread(study.held_out(name, robot)) for robot in robots),
@@ -189,13 +189,13 @@ def _claims(found: Sequence[Claim]) -> Table:
 
 def _hidden(study: StudyData) -> list[Block]:
     """What whoever trusts stored fitness would have taken home."""
-    robot, labels, rows = study.robots[0], labels_of(study), []
+    robot, rows = study.robots[0], []
     for name, runs in study.runs.items():
         stored, held_out = most_believed(study, name)
         if stored.size:
             rows.append(
                 [
-                    labels[name],
+                    label(name),
                     str(len(runs)),
                     spread(stored),
                     spread(held_out),
@@ -231,7 +231,6 @@ def _rungs(study: StudyData) -> list[Block]:
     if len(study.robots) < 2:
         return [Paragraph("Both rungs are the same robot here.")]
     first, last = study.robots[0], study.robots[-1]
-    labels = labels_of(study)
     shares = {
         name: kept(study.held_out(name, last), study.held_out(name, first))
         for name, runs in study.runs.items()
@@ -240,7 +239,7 @@ def _rungs(study: StudyData) -> list[Block]:
     return [
         Listing(
             [
-                f"{labels[name]}: {median_and_quartiles(100 * share, ' %')} of the "
+                f"{label(name)}: {median_and_quartiles(100 * share, ' %')} of the "
                 f"held-out fitness on {first} is kept on {last}, "
                 f"n = {len(study.runs[name])}."
                 for name, share in shares.items()

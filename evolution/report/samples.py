@@ -1,15 +1,21 @@
 """Samples of a report: what an experiment's champions show, one value per run."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from scipy import stats
 
-from evolution.study_data import StudyData
+from evolution.study_data import RunData, StudyData
+from evolution.targets import evaluations_to_target
 
 FOLLOWING = 0.9
 """Least share of a champion's trials that follow a wall without crashing."""
+
+TARGET_SHARES: tuple[float, ...] = tuple(
+    fitness / 300 for fitness in range(50, 250, 25)
+)
+"""Targets as shares of the highest fitness there is: 50, 75, ... 225 of 300."""
 
 FEWEST_FOR_RANKS = 5
 """Runs below which a rank correlation says nothing: of 4, any order is common."""
@@ -87,6 +93,21 @@ def most_believed(data: StudyData, name: str) -> tuple[np.ndarray, np.ndarray]:
     pairs = [(each["stored"], each["held_out"]) for each in found if each]
     stored, held_out = np.array(pairs, float).reshape(-1, 2).T
     return stored, held_out
+
+
+def hits(runs: Sequence[RunData], steps: int) -> np.ndarray:
+    """Evaluations until each run reached each target, `(runs, targets)`; nan: never."""
+    return np.array(
+        [
+            [
+                evaluations_to_target(
+                    run.history["evaluations"], run.history["best"], share * steps
+                )
+                for share in TARGET_SHARES
+            ]
+            for run in runs
+        ]
+    )
 
 
 def rank_correlation(a: np.ndarray, b: np.ndarray) -> float | None:

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from evolution.comparisons import fisher, holm
-from evolution.report.figures.style import with_runs, yardstick
 from evolution.report.samples import FOLLOWING, following_share
 from evolution.report.tables import shown_robots
 from evolution.statistics import wilson
@@ -76,7 +75,7 @@ def success_rows(data: StudyData) -> list[SuccessRow]:
         for criterion, met in _criteria(data, robot).items():
             outcomes = {
                 name: [met(run) for run in runs]
-                for name, runs in with_runs(data).items()
+                for name, runs in data.with_runs.items()
             }
             rows += _successes(criterion, robot, outcomes)
     # all of a criterion together
@@ -85,7 +84,7 @@ def success_rows(data: StudyData) -> list[SuccessRow]:
 
 def _criteria(data: StudyData, robot: str) -> dict[str, Callable[[RunData], bool]]:
     """What the data can tell of each run on a robot."""
-    reference, found = yardstick(data, robot), {}
+    reference, found = data.yardstick_mean(robot), {}
     if reference is not None:
         found[BEATS] = lambda run: run.held_out(robot) >= reference
     everything = [run for runs in data.runs.values() for run in runs]

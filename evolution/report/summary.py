@@ -10,7 +10,6 @@ import numpy as np
 
 from epuck_mj.behaviour_classes import HUG
 from evolution.config import ExperimentConfig
-from evolution.report.figures.style import with_runs
 from evolution.report.pairs import pair_rows
 from evolution.report.samples import (
     class_means,
@@ -23,13 +22,12 @@ from evolution.report.samples import (
 )
 from evolution.report.successes import success_rows
 from evolution.report.tables import (
-    labels_of,
     provenance,
     run_rows,
     shown_robots,
     target_rows,
 )
-from evolution.report.words import command_line
+from evolution.report.words import command_line, label
 from evolution.statistics import quartiles
 from evolution.study_data import StudyData
 
@@ -115,11 +113,11 @@ def summary_text(summary: dict[str, Any]) -> str:
 
 def _experiment(data: StudyData, name: str) -> dict[str, Any]:
     found: dict[str, Any] = {
-        "label": labels_of(data)[name],
+        "label": label(name),
         "n": len(data.runs[name]),
         "seeds": [run.seed for run in data.runs[name]],
     }
-    if name not in with_runs(data):
+    if name not in data.with_runs:
         return found
     first, last = data.robots[0], data.robots[-1]
     stored, evolved_on = data.stored(name), data.held_out(name, first)

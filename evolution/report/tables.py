@@ -12,9 +12,13 @@ import numpy as np
 
 from epuck_mj.errors import UserError
 from evolution.held_out import WHEELED_ROBOT
-from evolution.report.figures.curves import TARGET_SHARES, hits
-from evolution.report.figures.style import looks, with_runs
-from evolution.report.samples import clearance, following_share, success_share
+from evolution.report.samples import (
+    TARGET_SHARES,
+    clearance,
+    following_share,
+    hits,
+    success_share,
+)
 from evolution.run_directory import RunDirectory
 from evolution.study_data import RunData, StudyData
 from evolution.targets import expected_running_time_interval
@@ -36,11 +40,6 @@ def shown_robots(data: StudyData) -> tuple[str, ...]:
     return tuple(sorted(data.robots, key=lambda robot: robot != WHEELED_ROBOT))
 
 
-def labels_of(data: StudyData) -> dict[str, str]:
-    """Names of the experiments for readers."""
-    return {name: look.label for name, look in looks(data).items()}
-
-
 def held_out_measure(robot: str) -> str:
     """What held-out fitness on a robot is called in the tables."""
     return f"held-out {robot}"
@@ -49,10 +48,10 @@ def held_out_measure(robot: str) -> str:
 def measures(data: StudyData) -> dict[str, dict[str, np.ndarray]]:
     """Samples `(runs,)` by experiment with runs, of each measure: held-out first."""
     found = {
-        held_out_measure(robot): {n: data.held_out(n, robot) for n in with_runs(data)}
+        held_out_measure(robot): {n: data.held_out(n, robot) for n in data.with_runs}
         for robot in shown_robots(data)
     }
-    return found | {STORED: {name: data.stored(name) for name in with_runs(data)}}
+    return found | {STORED: {name: data.stored(name) for name in data.with_runs}}
 
 
 def run_rows(data: StudyData) -> list[dict[str, Any]]:
@@ -65,7 +64,7 @@ def run_rows(data: StudyData) -> list[dict[str, Any]]:
     """
     return [
         _run_row(data, name, run)
-        for name, runs in with_runs(data).items()
+        for name, runs in data.with_runs.items()
         for run in runs
     ]
 
@@ -143,7 +142,7 @@ class TargetRow:
 def target_rows(data: StudyData) -> list[TargetRow]:
     """A row per experiment with runs and target."""
     rows = []
-    for name, runs in with_runs(data).items():
+    for name, runs in data.with_runs.items():
         spent = np.array([run.history["evaluations"][-1] for run in runs])
         for share, hit in zip(TARGET_SHARES, hits(runs, data.steps).T, strict=True):
             cost = expected_running_time_interval(hit, spent, generator())

@@ -2,13 +2,45 @@
 
 import math
 import shlex
+from types import MappingProxyType
 
 import numpy as np
 
 from evolution.statistics import quartiles
 
+LABELS: MappingProxyType[str, str] = MappingProxyType(
+    {
+        "de-best": "DE/best/1/bin",
+        "de-rand": "DE/rand/1/bin",
+        "ga": "GA",
+        "cma-es": "CMA-ES",
+        "one-plus-one-es": "(1+1)-ES",
+        "random-search": "random search",
+    }
+)
+"""Names of shipped experiments; any other is called by its own."""
+
+PAPERS = ("de-best", "de-rand", "ga")
+"""The experiments of the paper."""
+
+ROBOTS: MappingProxyType[str, str] = MappingProxyType(
+    {"epuck_planar": "planar robot", "epuck": "wheeled robot"}
+)
+
+YARDSTICK_LABEL = "hand-written wall follower"
+
 NOTHING = "-"
 """Stands for what is not known."""
+
+
+def label(experiment: str) -> str:
+    """An experiment's name for readers."""
+    return LABELS.get(experiment, experiment)
+
+
+def robot_name(robot: str) -> str:
+    """A robot's name for readers."""
+    return ROBOTS.get(robot, robot)
 
 
 def spread(sample: np.ndarray, scale: float = 1.0, form: str = ".1f") -> str:

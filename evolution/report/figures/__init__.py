@@ -13,7 +13,7 @@ from epuck_mj.files import write_bytes
 from evolution.report.figures.behaviour import behaviour, trajectories
 from evolution.report.figures.champions import held_out, rungs, stored_and_held_out
 from evolution.report.figures.curves import fitness, fitness_all, targets
-from evolution.report.figures.style import PRINT, with_runs
+from evolution.report.figures.style import PRINT
 from evolution.study_data import StudyData
 
 FORMATS: MappingProxyType[str, MappingProxyType[str, None]] = MappingProxyType(
@@ -55,7 +55,7 @@ def figures(data: StudyData) -> Iterator[tuple[str, Figure, str]]:
     Raises:
         UserError: if the wheeled robot cannot use the arena.
     """
-    for name in with_runs(data):
+    for name in data.with_runs:
         yield f"fitness-{name}", *fitness(data, name)
     for name, draw in FIGURES.items():
         drawn = draw(data)

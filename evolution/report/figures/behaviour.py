@@ -20,17 +20,14 @@ from evolution.figures import trajectory_figure
 from evolution.held_out import WHEELED_ROBOT
 from evolution.report.figures.style import (
     PAGE,
-    PAPERS,
     PRINT,
-    YARDSTICK_LABEL,
     Color,
     color,
     counted,
     legend_below,
-    looks,
     robot_panels,
-    with_runs,
 )
+from evolution.report.words import PAPERS, YARDSTICK_LABEL, label
 from evolution.study_data import RunData, StudyData
 
 N_STARTS = 2
@@ -69,7 +66,7 @@ def trajectories(data: StudyData) -> tuple[Figure, str]:
     Raises:
         UserError: if the wheeled robot cannot use the arena.
     """
-    runs, styles = with_runs(data), looks(data)
+    runs = data.with_runs
     shown = [name for name in PAPERS if name in runs] or list(runs)[:MOST_CHAMPIONS]
     # one picture has one arena and one kind of fitness
     config = data.configs[shown[0]]
@@ -83,12 +80,12 @@ def trajectories(data: StudyData) -> tuple[Figure, str]:
         trials.append([record(scene, policy, start, config.task) for start in starts])
         titles.append(
             [
-                f"{styles[name].label}, seed {run.seed}\n"
+                f"{label(name)}, seed {run.seed}\n"
                 f"start {i}: fitness {trial.trial_fitness:.0f}"
                 for i, trial in enumerate(trials[-1])
             ]
         )
-        who.append(f"seed {run.seed} of {counted(styles[name], len(runs[name]))}")
+        who.append(f"seed {run.seed} of {counted(name, len(runs[name]))}")
     # a column each
     figure = trajectory_figure(
         scene,
@@ -159,12 +156,12 @@ def _class_shares(data: StudyData, robot: str) -> dict[str, dict[str, float]]:
     The hand-written wall follower is the last row.
     """
     found = {}
-    for name, runs in with_runs(data).items():
+    for name, runs in data.with_runs.items():
         tests = [run.champion.scores["held_out"][robot] for run in runs]
         shares = [test["behaviour"] for test in tests if test.get("behaviour")]
         if shares:
             classes = dict.fromkeys(name for each in shares for name in each)
-            found[counted(looks(data)[name], len(shares))] = {
+            found[counted(name, len(shares))] = {
                 name: float(np.mean([each.get(name, 0.0) for each in shares]))
                 for name in classes
             }

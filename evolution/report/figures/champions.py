@@ -12,7 +12,6 @@ from evolution.report.figures.style import (
     COLUMN,
     PAGE,
     PRINT,
-    YARDSTICK_LABEL,
     YARDSTICK_LOOK,
     YARDSTICK_SHORT,
     Look,
@@ -20,11 +19,9 @@ from evolution.report.figures.style import (
     counts,
     legend_below,
     looks,
-    robot_name,
     robot_panels,
-    with_runs,
-    yardstick,
 )
+from evolution.report.words import YARDSTICK_LABEL, robot_name
 from evolution.statistics import quartiles
 from evolution.study_data import StudyData
 
@@ -40,20 +37,20 @@ CHAMPION = "A champion's held-out fitness is its mean on the test starts."
 @matplotlib.rc_context(PRINT)
 def stored_and_held_out(data: StudyData) -> tuple[Figure, str]:
     """Held-out against stored fitness of every champion, a panel per experiment."""
-    runs, styles = with_runs(data), looks(data)
+    runs, styles = data.with_runs, looks(data)
     columns = min(len(runs), MOST_COLUMNS)
     rows = -(-len(runs) // columns)
     width = max(COLUMN, PAGE * columns / MOST_COLUMNS)
     figure = Figure(figsize=(width, 0.4 + 2 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
-    reference = yardstick(data, data.robots[0])
+    reference = data.yardstick_mean(data.robots[0])
     for axes in grid.flat[len(runs) :]:
         axes.remove()
     for axes, (name, each) in zip(grid.flat, runs.items(), strict=False):
         _draw_luck(axes, data, name, styles[name])
         if reference is not None:
             axes.axhline(reference, **YARDSTICK_LOOK, zorder=1)
-        axes.set_title(counted(styles[name], len(each)))
+        axes.set_title(counted(name, len(each)))
         axes.set(ylim=(0, data.steps), xlabel="runs, in order of stored fitness")
     for axes in grid[:, 0]:
         axes.set_ylabel(f"fitness (max {data.steps})")
@@ -80,8 +77,8 @@ def stored_and_held_out(data: StudyData) -> tuple[Figure, str]:
 @matplotlib.rc_context(PRINT)
 def held_out(data: StudyData) -> tuple[Figure, str]:
     """Held-out fitness of every champion, a row per experiment, a panel per robot."""
-    runs, styles = with_runs(data), looks(data)
-    labels = [counted(styles[name], len(each)) for name, each in runs.items()]
+    runs, styles = data.with_runs, looks(data)
+    labels = [counted(name, len(each)) for name, each in runs.items()]
     figure, panels = robot_panels(data, labels)
     lines = {
         "one run": Line2D([], [], color="0.4", ls="", marker="o", ms=3.5),
@@ -90,7 +87,7 @@ def held_out(data: StudyData) -> tuple[Figure, str]:
     for axes, robot in zip(panels, data.robots, strict=True):
         for row, name in enumerate(runs):
             _draw_row(axes, row, data.held_out(name, robot), styles[name])
-        reference = yardstick(data, robot)
+        reference = data.yardstick_mean(robot)
         if reference is not None:
             lines[YARDSTICK_LABEL] = axes.axvline(reference, **YARDSTICK_LOOK, zorder=1)
         axes.set(xlabel=f"held-out fitness (max {data.steps})", xlim=(0, data.steps))
@@ -111,7 +108,7 @@ def rungs(data: StudyData) -> tuple[Figure, str] | None:
     if len(data.robots) < 2:
         return None
     first, last = data.robots[0], data.robots[-1]
-    runs, styles = with_runs(data), looks(data)
+    runs, styles = data.with_runs, looks(data)
     figure = Figure(figsize=(COLUMN, 4), layout="constrained")
     axes = figure.add_subplot()
     axes.plot([0, data.steps], [0, data.steps], color="0.5", lw=0.8, zorder=1)
@@ -119,10 +116,10 @@ def rungs(data: StudyData) -> tuple[Figure, str] | None:
     for name, each in runs.items():
         x, y = data.held_out(name, first), data.held_out(name, last)
         axes.scatter(x, y, **_dots(styles[name]))
-        lines[counted(styles[name], len(each))] = Line2D(
+        lines[counted(name, len(each))] = Line2D(
             [], [], color=styles[name].color, ls="", marker=styles[name].marker, ms=4
         )
-    x, y = yardstick(data, first), yardstick(data, last)
+    x, y = data.yardstick_mean(first), data.yardstick_mean(last)
     if x is not None and y is not None:
         axes.plot(x, y, "+", color="black", ms=9, mew=1.2, zorder=2)
         lines[YARDSTICK_LABEL] = Line2D([], [], color="black", ls="", marker="+", ms=7)

@@ -11,7 +11,6 @@ from matplotlib.lines import Line2D
 from evolution.report.figures.style import (
     COLUMN,
     PRINT,
-    YARDSTICK_LABEL,
     YARDSTICK_LOOK,
     YARDSTICK_SHORT,
     Look,
@@ -20,23 +19,17 @@ from evolution.report.figures.style import (
     counts,
     legend_below,
     looks,
-    robot_name,
-    with_runs,
-    yardstick,
 )
+from evolution.report.samples import TARGET_SHARES, hits
+from evolution.report.words import YARDSTICK_LABEL, label, robot_name
 from evolution.study_data import RunData, StudyData
-from evolution.targets import ecdf, evaluations_to_target
+from evolution.targets import ecdf
 
 N_POINTS = 150
 """Most points of a curve: more than print shows, few enough for small files."""
 
 N_MARKERS = 6
 """Markers along a curve, which tell it apart where colour is missing."""
-
-TARGET_SHARES: tuple[float, ...] = tuple(
-    fitness / 300 for fitness in range(50, 250, 25)
-)
-"""Targets as shares of the highest fitness there is: 50, 75, ... 225 of 300."""
 
 STORED = "Stored fitness is what evolution believes: the mean of the few trials it ran."
 
@@ -97,9 +90,9 @@ def fitness(data: StudyData, name: str) -> tuple[Figure, str]:
         lines[f"population {column}"] = line
     of_yardstick = _draw_yardstick(axes, data, lines)
     _stored_axes(axes, data, grid[-1])
-    legend_below(figure, lines, title=counted(look, len(runs)))
+    legend_below(figure, lines, title=counted(name, len(runs)))
     caption = (
-        f"{look.label}: stored fitness of the best of the population and its mean "
+        f"{label(name)}: stored fitness of the best of the population and its mean "
         "against evaluations. Median and interquartile range over runs "
         f"(n = {len(runs)}); thin: the single runs. {STORED}{of_yardstick}"
     )
@@ -111,7 +104,7 @@ def fitness_all(data: StudyData) -> tuple[Figure, str]:
     """Best so far of all experiments on one axes."""
     figure = Figure(figsize=(COLUMN, 3.3), layout="constrained")
     axes = figure.add_subplot()
-    lines, styles, runs, last = {}, looks(data), with_runs(data), 0.0
+    lines, styles, runs, last = {}, looks(data), data.with_runs, 0.0
     for i, (name, each) in enumerate(runs.items()):
         grid = common_grid(each)
         best = np.array(
@@ -126,7 +119,7 @@ def fitness_all(data: StudyData) -> tuple[Figure, str]:
         )
         line = _median_and_band(axes, grid, best, styles[name].color)
         _mark(line, styles[name], grid.size, i, len(runs))
-        lines[counted(styles[name], len(each))] = line
+        lines[counted(name, len(each))] = line
         last = max(last, grid[-1])
     of_yardstick = _draw_yardstick(axes, data, lines)
     _stored_axes(axes, data, last)
@@ -143,7 +136,7 @@ def targets(data: StudyData) -> tuple[Figure, str]:
     """Share of all pairs of run and target reached, against evaluations."""
     figure = Figure(figsize=(COLUMN, 3.2), layout="constrained")
     axes = figure.add_subplot()
-    lines, styles, runs = {}, looks(data), with_runs(data)
+    lines, styles, runs = {}, looks(data), data.with_runs
     last = max(run.history["evaluations"][-1] for each in runs.values() for run in each)
     budgets = np.linspace(0, last, N_POINTS + 1)
     for i, (name, each) in enumerate(runs.items()):
@@ -152,7 +145,7 @@ def targets(data: StudyData) -> tuple[Figure, str]:
             budgets, share, color=styles[name].color, drawstyle="steps-post"
         )
         _mark(line, styles[name], budgets.size, i, len(runs))
-        lines[counted(styles[name], len(each))] = line
+        lines[counted(name, len(each))] = line
     count_evaluations(axes, last)
     axes.set(ylabel="share of (run, target) pairs", ylim=(0, 1.02))
     legend_below(figure, lines)
@@ -163,21 +156,6 @@ def targets(data: StudyData) -> tuple[Figure, str]:
         f"of {data.steps}."
     )
     return figure, caption
-
-
-def hits(runs: Sequence[RunData], steps: int) -> np.ndarray:
-    """Evaluations until each run reached each target, `(runs, targets)`; nan: never."""
-    return np.array(
-        [
-            [
-                evaluations_to_target(
-                    run.history["evaluations"], run.history["best"], share * steps
-                )
-                for share in TARGET_SHARES
-            ]
-            for run in runs
-        ]
-    )
 
 
 def _median_and_band(axes: Axes, grid: np.ndarray, values: np.ndarray, color) -> Line2D:
@@ -192,7 +170,7 @@ def _median_and_band(axes: Axes, grid: np.ndarray, values: np.ndarray, color) ->
 def _draw_yardstick(axes: Axes, data: StudyData, lines: dict[str, Line2D]) -> str:
     """The hand-written follower's line, if it was tested, and a caption's words."""
     robot = data.robots[0]
-    reference = yardstick(data, robot)
+    reference = data.yardstick_mean(robot)
     if reference is None:
         return ""
     lines[YARDSTICK_SHORT] = axes.axhline(reference, **YARDSTICK_LOOK)

@@ -14,7 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from epuck_mj import colors
-from evolution.study_data import RunData, StudyData
+from evolution.report.words import label, robot_name
+from evolution.study_data import StudyData
 
 COLUMN, PAGE = 3.5, 7.0
 """Widths of one and of two columns of a paper [inch]."""
@@ -57,16 +58,14 @@ def color(rgb: tuple[int, int, int]) -> Color:
 
 @dataclass(frozen=True)
 class Look:
-    """How an experiment is named and drawn in every figure.
+    """How an experiment is drawn in every figure.
 
     Attributes:
-        label: its name for readers.
         color: in [0, 1].
         dashes: line style.
         marker: of its points.
     """
 
-    label: str
     color: Color
     dashes: Dashes
     marker: str
@@ -74,20 +73,15 @@ class Look:
 
 LOOKS: MappingProxyType[str, Look] = MappingProxyType(
     {
-        "de-best": Look("DE/best/1/bin", color(colors.BLUE), "-", "o"),
-        "de-rand": Look("DE/rand/1/bin", color(colors.VERMILION), (0, (7, 2)), "s"),
-        "ga": Look("GA", color(colors.GREEN), (0, (7, 1.5, 1.2, 1.5)), "^"),
-        "cma-es": Look("CMA-ES", color(colors.PURPLE), (0, (3, 1.2)), "D"),
-        "one-plus-one-es": Look(
-            "(1+1)-ES", color(colors.ORANGE), (0, (4, 1, 1, 1, 1, 1)), "v"
-        ),
-        "random-search": Look("random search", color(colors.GREY), (0, (1, 1)), ">"),
+        "de-best": Look(color(colors.BLUE), "-", "o"),
+        "de-rand": Look(color(colors.VERMILION), (0, (7, 2)), "s"),
+        "ga": Look(color(colors.GREEN), (0, (7, 1.5, 1.2, 1.5)), "^"),
+        "cma-es": Look(color(colors.PURPLE), (0, (3, 1.2)), "D"),
+        "one-plus-one-es": Look(color(colors.ORANGE), (0, (4, 1, 1, 1, 1, 1)), "v"),
+        "random-search": Look(color(colors.GREY), (0, (1, 1)), ">"),
     }
 )
 """Shipped experiments; any other takes a spare look."""
-
-PAPERS = ("de-best", "de-rand", "ga")
-"""The experiments of the paper."""
 
 # without yellow, which white paper swallows
 SPARE_COLORS = (colors.SKY, colors.ORANGE, colors.PURPLE)
@@ -98,17 +92,10 @@ SPARE_LINES = (
     ((0, (9, 2)), "*"),
 )
 
-ROBOTS: MappingProxyType[str, str] = MappingProxyType(
-    {"epuck_planar": "planar robot", "epuck": "wheeled robot"}
-)
-
 YARDSTICK_LOOK: MappingProxyType[str, Any] = MappingProxyType(
     {"color": "black", "linestyle": "--", "linewidth": 1}
 )
-YARDSTICK_SHORT, YARDSTICK_LABEL = (
-    "hand-written, held-out",
-    "hand-written wall follower",
-)
+YARDSTICK_SHORT = "hand-written, held-out"
 
 
 def looks(data: StudyData) -> dict[str, Look]:
@@ -121,37 +108,22 @@ def looks(data: StudyData) -> dict[str, Look]:
             found[name] = LOOKS[name]
         else:
             rgb, (dashes, marker) = next(spare)
-            found[name] = Look(name, color(rgb), dashes, marker)
+            found[name] = Look(color(rgb), dashes, marker)
     return found
 
 
-def with_runs(data: StudyData) -> dict[str, tuple[RunData, ...]]:
-    """The runs of the experiments that have any, in the study's order."""
-    return {name: data.runs[name] for name in data.configs if data.runs.get(name)}
-
-
-def counted(look: Look, n: int) -> str:
-    """The experiment's name with its number of runs."""
-    return f"{look.label} (n = {n})"
+def counted(name: str, n: int) -> str:
+    """An experiment's name for readers with its number of runs."""
+    return f"{label(name)} (n = {n})"
 
 
 def counts(data: StudyData) -> str:
     """How many runs each experiment has, for a caption."""
-    runs, styles = with_runs(data), looks(data)
+    runs = data.with_runs
     sizes = {len(each) for each in runs.values()}
     if len(sizes) == 1:
         return f"n = {sizes.pop()} per experiment"
-    return "; ".join(counted(styles[name], len(each)) for name, each in runs.items())
-
-
-def robot_name(robot: str) -> str:
-    """A robot's name for readers."""
-    return ROBOTS.get(robot, robot)
-
-
-def yardstick(data: StudyData, robot: str) -> float | None:
-    """Held-out fitness of the hand-written wall follower, None if it is not known."""
-    return data.yardstick.get(robot, {}).get("mean")
+    return "; ".join(counted(name, len(each)) for name, each in runs.items())
 
 
 def count_evaluations(axes: Axes, last: float) -> None:
