@@ -1,6 +1,7 @@
 """Evolve a controller: `python -m evolution.run [EXPERIMENT] [options]`."""
 
 import argparse
+import signal
 import sys
 import time
 from collections.abc import Sequence
@@ -12,7 +13,9 @@ from typing import Literal
 import tyro
 
 from epuck_mj.command_line import check_threads, command, main, parse
+from epuck_mj.controller import ControllerFile
 from epuck_mj.errors import UserError
+from epuck_mj.interruption import Interrupted, Interruption
 from epuck_mj.model import absolute
 from evolution.config import (
     DEFAULT_EXPERIMENT,
@@ -21,7 +24,6 @@ from evolution.config import (
     load_config,
 )
 from evolution.execution import Means, Run
-from evolution.interruption import Interrupted, interruptible
 from evolution.live import Live, require_viewer
 from evolution.progress import Progress
 from evolution.results import summary
@@ -136,26 +138,17 @@ def _carry_out(evolution: Run, live: bool) -> int:
     """Evolve, then choose and show the champion; the exit status."""
     experiment, directory = evolution.experiment, evolution.directory
     started = time.monotonic()
-    try:
-        with interruptible():
-            budget = experiment.config.evaluations
-            with (
-                Live(experiment) if live else nullcontext() as view,
-                Progress(budget, experiment.evaluations) as progress,
-            ):
-                for record in evolution.evolve():
-                    progress.update(record)
-                    if view is not None:
-                        view.update()
-            print("Choosing the champion on fresh starts ...", file=sys.stderr)
-            controller = evolution.finish()
-    except Interrupted as interruption:
-        print(
-            f"Interrupted after {directory.evaluations():,} evaluations; go on with: "
-            + command(MODULE, "--resume", directory.path),
-            file=sys.stderr,
-        )
-        return interruption.status
+    with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:
+        try:
+            with interruption.raising():
+                controller = _finished(evolution, live)
+        except Interrupted:
+            print(
+                f"Interrupted after {directory.evaluations():,} evaluations; go on "
+                f"with: {command(MODULE, '--resume', directory.path)}",
+                file=sys.stderr,
+            )
+            return interruption.status
     minutes, seconds = divmod(round(time.monotonic() - started), 60)
     print(
         f"{experiment.optimizer.name}, seed {experiment.config.seed}: "
@@ -166,6 +159,22 @@ def _carry_out(evolution: Run, live: bool) -> int:
     print(f"Written to {directory.path}: {directory.contents()}")
     print(_replay(directory))
     return 0
+
+
+def _finished(evolution: Run, live: bool) -> ControllerFile:
+    """Evolve, and choose the champion."""
+    experiment = evolution.experiment
+    budget = experiment.config.evaluations
+    with (
+        Live(experiment) if live else nullcontext() as view,
+        Progress(budget, experiment.evaluations) as progress,
+    ):
+        for record in evolution.evolve():
+            progress.update(record)
+            if view is not None:
+                view.update()
+    print("Choosing the champion on fresh starts ...", file=sys.stderr)
+    return evolution.finish()
 
 
 def _replay(directory: RunDirectory) -> str:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -14,9 +15,9 @@ from tqdm import tqdm
 from epuck_mj import controller, files
 from epuck_mj.command_line import command, main, parse
 from epuck_mj.errors import UserError
+from epuck_mj.interruption import Interrupted, Interruption
 from epuck_mj.wall_follower import WallFollower
 from evolution.execution import Means
-from evolution.interruption import Interrupted, interruptible
 from evolution.jobs import Event, Job, carry_out_side_by_side
 from evolution.results import judges, scores
 from evolution.study_config import StudyConfig, find_study, parse_seeds
@@ -87,21 +88,22 @@ def study(argv: Sequence[str]) -> int:
     jobs = [job for job in everything if not _finished(job, directory)]
     started = time.monotonic()
     failed: list[Job] = []
-    try:
-        with interruptible():
-            # first: a study cut short has it, too
-            try:
-                _measure_yardstick(directory, config)
-            except UserError as error:
-                print(f"{YARDSTICK} could not be tested: {error}", file=sys.stderr)
-            events = _shown(everything, jobs, _events(jobs, options))
-            failed.extend(event.job for event in events if event.failure is not None)
-    except Interrupted as interruption:
-        print(
-            f"Interrupted; go on with: {command(MODULE, *argv)}",
-            file=sys.stderr,
-        )
-        return interruption.status
+    with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:
+        try:
+            with interruption.raising():
+                # first: a study cut short has it, too
+                try:
+                    _measure_yardstick(directory, config)
+                except UserError as error:
+                    print(f"{YARDSTICK} could not be tested: {error}", file=sys.stderr)
+                events = _shown(everything, jobs, _events(jobs, options))
+                failed.extend(
+                    event.job for event in events if event.failure is not None
+                )
+        except Interrupted:
+            again = command(MODULE, *argv)
+            print(f"Interrupted; go on with: {again}", file=sys.stderr)
+            return interruption.status
     done = len(everything) - len(failed)
     minutes = (time.monotonic() - started) / 60
     print(f"{done} of {len(everything)} runs are finished, {minutes:.1f} min")

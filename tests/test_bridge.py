@@ -17,11 +17,11 @@ from rerun.chunk import RrdReader
 from epuck_mj.bridge.__main__ import bridge
 from epuck_mj.bridge.body import Wheel
 from epuck_mj.bridge.fake.endpoints import Pty, Tcp
-from epuck_mj.bridge.interruption import SIGNALS, Interrupted, Interruption
 from epuck_mj.calibration import Calibration
 from epuck_mj.constants import SPEED_MAX, WHEEL_RADIUS
 from epuck_mj.controller import ControllerFile, Network
 from epuck_mj.errors import UserError
+from epuck_mj.interruption import SIGNALS, Interrupted, Interruption
 from epuck_mj.model import load_scene
 from epuck_mj.motors import STEP_ANGLE
 from epuck_mj.trajectory import Trajectory

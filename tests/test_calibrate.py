@@ -20,7 +20,6 @@ from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Pty
 from epuck_mj.bridge.fake.scenarios import scenario
 from epuck_mj.bridge.fake.virtual import VirtualPort, VirtualTime
-from epuck_mj.bridge.interruption import SIGNALS
 from epuck_mj.bridge.link import Link
 from epuck_mj.bridge.serial_line import SerialLine
 from epuck_mj.bridge.wifi_line import WifiLine
@@ -45,6 +44,7 @@ from epuck_mj.constants import (
 from epuck_mj.disturbances import Noise, calibrated
 from epuck_mj.disturbed_robots import DisturbedRobots
 from epuck_mj.errors import UserError
+from epuck_mj.interruption import SIGNALS
 from epuck_mj.model import MODELS, load_scene
 from epuck_mj.motors import STEP_ANGLE
 from epuck_mj.sensors import counted, proximity

@@ -916,14 +916,14 @@ def test_a_run_on_an_own_robot_can_be_resumed_from_elsewhere(here, quick, monkey
 
 def test_a_run_killed_while_it_wrote_its_config_can_be_started_again(here, quick):
     (here / "run").mkdir()
-    (here / "run" / ".config.yaml-b2q7x_1c").write_text("seed: 7")
+    (here / "run" / ".config.yaml-b2q7x_1c.tmp").write_text("seed: 7")
     assert run(["ga", *SHORT, "--output", "run"]) == 0
 
 
 def test_leftovers_of_a_kill_are_not_shown(unfinished, quick, capsys):
-    (unfinished / ".checkpoint.npz-b2q7x_1c").write_bytes(b"PK")
+    (unfinished / ".checkpoint.npz-b2q7x_1c.tmp").write_bytes(b"PK")
     assert run(["--resume", "run"]) == 0
-    assert "b2q7x_1c" not in capsys.readouterr().out
+    assert "b2q7x_1c.tmp" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("content", ["", "{", "[1]", '{"resumed": 3}'])

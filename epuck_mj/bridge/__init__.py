@@ -14,6 +14,6 @@ With ports and clocks:
   `wifi_line`: what a `connection` offers, on either.
 - `robot`: `control.Robot` on a connection, with `schedule` and `odometry`; its
   `session`, the control loop; its `mission`, from the first word to the `log`.
-- `interruption`, `guardian`, `keyboard`: what ends a mission, and who stops the robot.
+- `guardian`, `keyboard`: what ends a mission, and who stops the robot.
 - `fake`: a robot to try it all on.
 """

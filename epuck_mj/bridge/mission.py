@@ -8,7 +8,6 @@ from pathlib import Path
 
 from epuck_mj.bridge.connection import Connection
 from epuck_mj.bridge.errors import BridgeError, StillMoving
-from epuck_mj.bridge.interruption import Interrupted, Interruption
 from epuck_mj.bridge.keyboard import Keyboard, keyboard
 from epuck_mj.bridge.log import save_log
 from epuck_mj.bridge.report import HEADING, live_line, summary
@@ -17,6 +16,7 @@ from epuck_mj.bridge.session import Session
 from epuck_mj.calibration import Calibration
 from epuck_mj.control import Policy, TaskParameters
 from epuck_mj.errors import UserError
+from epuck_mj.interruption import Interrupted, Interruption
 from epuck_mj.model import Scene
 
 DONE, FAILED, RUNAWAY = 0, 3, 4
@@ -102,7 +102,7 @@ def accomplish(
         finally:
             facts, failure = _save(mission, session, robot)
         if interruption.signum is not None and status != RUNAWAY:
-            status = 128 + interruption.signum
+            status = interruption.status
             still = "the robot stands still" if robot and robot.met else "never began"
             word = f"{interruption.signum.name}: ended, {still}"
         # nobody may be there to read the rest

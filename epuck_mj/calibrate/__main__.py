@@ -10,7 +10,6 @@ from typing import Literal
 from epuck_mj.bridge.connect import connect
 from epuck_mj.bridge.connection import Clock, Connection
 from epuck_mj.bridge.errors import BridgeError, StillMoving
-from epuck_mj.bridge.interruption import Interrupted, Interruption
 from epuck_mj.bridge.mission import DONE, FAILED, RUNAWAY
 from epuck_mj.calibrate.guide import STEPS, Person
 from epuck_mj.calibrate.measure import Bench
@@ -18,6 +17,7 @@ from epuck_mj.calibration import Calibration
 from epuck_mj.command_line import main, parse
 from epuck_mj.errors import UserError
 from epuck_mj.files import check_writable, is_file
+from epuck_mj.interruption import Interrupted, Interruption
 
 MODULE = "epuck_mj.calibrate"
 
@@ -98,7 +98,7 @@ def accomplish(
         except BridgeError as error:
             status, word = FAILED, f"error: {error}; the robot stands still"
         if interruption.signum is not None and status != RUNAWAY:
-            status = 128 + interruption.signum
+            status = interruption.status
             word = f"{interruption.signum.name}: ended, the robot stands still"
         if word:
             # a question may stand there unanswered

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from epuck_mj.bridge.interruption import Interruption
 from epuck_mj.calibrate import measure
 from epuck_mj.calibrate.fitting import (
     SATURATED,
@@ -22,6 +21,7 @@ from epuck_mj.calibrate.measure import Bench
 from epuck_mj.calibration import Calibration
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
+from epuck_mj.interruption import Interruption
 from epuck_mj.motors import STEP_ANGLE
 
 CLEARANCES = (0.010, 0.020, 0.030)

@@ -14,10 +14,10 @@ from epuck_mj.bridge.fake.body import MujocoBody
 from epuck_mj.bridge.fake.emulator import WIFI, Emulator
 from epuck_mj.bridge.fake.endpoints import Endpoint, Pty, Tcp, serve
 from epuck_mj.bridge.fake.scenarios import random_scenario, scenario
-from epuck_mj.bridge.interruption import Interrupted, Interruption
 from epuck_mj.command_line import main, parse
 from epuck_mj.errors import UserError
 from epuck_mj.files import check_writable
+from epuck_mj.interruption import Interrupted, Interruption
 from epuck_mj.model import load_scene
 
 MODULE = "epuck_mj.bridge.fake"

@@ -1,7 +1,8 @@
 """Ctrl-C, kill and a closed terminal: one exception, and only where it may be raised.
 
-What stops the motors must not be broken off half-way, not even by a first signal that
-comes while it runs. So signals raise inside `raising` only; elsewhere they are noted.
+What stops motors or puts files in order must not be broken off half-way, not even by
+a first signal that comes while it runs. So signals raise inside `raising` only;
+elsewhere they are noted.
 """
 
 import signal
@@ -30,15 +31,21 @@ class Interruption:
         signum: the first signal that came; None if none did.
     """
 
-    def __init__(self) -> None:
-        """Nothing came, nothing is handled."""
+    def __init__(self, *signals: signal.Signals) -> None:
+        """Nothing came, nothing is handled; without `signals`, all of `SIGNALS` are."""
+        self._signals = signals or SIGNALS
         self.signum: signal.Signals | None = None
         self._raises = False
         self._previous: dict[signal.Signals, Any] = {}
 
+    @property
+    def status(self) -> int:
+        """What the shell expects of a process that a signal has ended."""
+        return 128 + (self.signum or 0)
+
     def __enter__(self) -> Self:
         """Handle the signals."""
-        for signum in SIGNALS:
+        for signum in self._signals:
             self._previous[signum] = signal.signal(signum, self._handle)
         return self
 
