@@ -14,6 +14,12 @@ LOW_FITNESS, HIGH_FITNESS = YELLOW, BLUE
 """Colours of a path, from step fitness 0 to 1."""
 
 
+def fraction(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
+    """A colour as matplotlib has it: it counts to 1."""
+    red, green, blue = rgb
+    return red / 255, green / 255, blue / 255
+
+
 def blend(low: tuple, high: tuple, share: np.ndarray) -> np.ndarray:
     """Colours `(n, 3)` from `low` at 0 to `high` at 1, for `share` `(n,)`."""
     mixed = np.array(low) + share[:, None] * (np.array(high) - low)

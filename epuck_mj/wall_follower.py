@@ -5,6 +5,9 @@ It keeps walls on its right. Its few numbers were chosen by hand in the paper's 
 
 import numpy as np
 
+YARDSTICK = "wall-follower"
+"""What it is called where a champion may be named, and among the experiments."""
+
 BEHIND, RIGHT, RIGHT_DIAGONAL = 3, 2, 1
 AHEAD = (0, 6, 7)
 """Front right, left diagonal, front left."""

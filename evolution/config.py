@@ -24,6 +24,7 @@ from epuck_mj.control import TaskParameters
 from epuck_mj.controller import Network
 from epuck_mj.errors import UserError
 from epuck_mj.files import is_file
+from epuck_mj.model import absolute
 from epuck_mj.motors import Speeds
 from epuck_mj.tasks import START_CLEARANCE
 from evolution.conditions import Conditions
@@ -192,6 +193,11 @@ class ExperimentConfig(BaseModel):
             init_upper=self.weight_init,
         )
 
+    def located(self) -> Self:
+        """The config with paths that mean the same from anywhere."""
+        paths = {"robot": absolute(self.robot), "arena": absolute(self.arena)}
+        return self.model_copy(update=paths)
+
     def to_yaml(self) -> str:
         """The resolved config: every key, in the order above."""
         return yaml.safe_dump(self.model_dump(), sort_keys=False)
@@ -258,7 +264,7 @@ def load_config(path: Path) -> ExperimentConfig:
 
 def differing_keys(stored: ExperimentConfig, asked: ExperimentConfig) -> list[str]:
     """What two configs disagree about, a text for each key."""
-    before, after = _flat(stored), _flat(asked)
+    before, after = flat(stored), flat(asked)
     return [
         f"{key} (stored {before.get(key)}, got {after.get(key)})"
         for key in dict.fromkeys([*before, *after])
@@ -266,7 +272,7 @@ def differing_keys(stored: ExperimentConfig, asked: ExperimentConfig) -> list[st
     ]
 
 
-def _flat(config: ExperimentConfig) -> dict[str, Any]:
+def flat(config: ExperimentConfig) -> dict[str, Any]:
     """Keys and values, the optimiser's as `optimizer.<key>`."""
     fields = config.model_dump()
     optimizer = fields.pop("optimizer")

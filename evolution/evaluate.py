@@ -13,13 +13,13 @@ from epuck_mj.calibration import Calibration
 from epuck_mj.command_line import check_threads, main, parse
 from epuck_mj.disturbances import Disturbances
 from epuck_mj.errors import UserError
+from epuck_mj.wall_follower import YARDSTICK
 from evolution.champion import HELD_OUT_SEED, N_TEST
 from evolution.conditions import Conditions
 from evolution.config import NoiseLevel
 from evolution.experiment import Purpose, disturbances
 from evolution.held_out import HeldOut, judging, tested_on
 from evolution.named_policies import named_policies
-from evolution.study_data import YARDSTICK
 
 MODULE = "evolution.evaluate"
 STARTS_MAX = 100_000

@@ -21,8 +21,7 @@ from epuck_mj.model import Scene
 from epuck_mj.outline import shell_outline, wall_outlines
 from epuck_mj.trajectory import Trajectory
 
-# matplotlib counts to 1
-BLUE, VERMILION = (tuple(np.array(c) / 255) for c in (colors.BLUE, colors.VERMILION))
+BLUE, VERMILION = colors.fraction(colors.BLUE), colors.fraction(colors.VERMILION)
 
 # yellow to dark blue, without the end that white paper swallows
 FITNESS_COLORS = ListedColormap(colormaps["cividis_r"](np.linspace(0.1, 1, 256)))

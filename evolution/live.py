@@ -7,7 +7,6 @@ left out, and one that goes away takes nothing with it.
 import multiprocessing
 import os
 import queue
-import signal
 import socket
 import sys
 import time
@@ -25,6 +24,7 @@ from epuck_mj.trajectory import record
 from evolution.champion import starts_for_test
 from evolution.config import ExperimentConfig
 from evolution.experiment import Experiment, Record
+from evolution.jobs import deaf_to_interrupts
 
 HOST, PORT = "127.0.0.1", 9876
 """Where rerun's viewer listens."""
@@ -71,7 +71,9 @@ class Live:
 
     def __enter__(self) -> Self:
         """Start, with what a resumed run has behind it."""
-        self._process.start()
+        # Ctrl-C is the run's business
+        with deaf_to_interrupts():
+            self._process.start()
         self.update()
         return self
 
@@ -111,8 +113,6 @@ def viewer_there(port: int) -> bool:
 
 def _show(config: ExperimentConfig, port: int, generations: Any) -> None:
     """What the viewer's process does."""
-    # Ctrl-C is the run's business
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     # rerun is loaded by those who use it
     from epuck_mj.recording.live import LiveView
 

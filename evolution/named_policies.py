@@ -15,10 +15,9 @@ from epuck_mj import controller, files
 from epuck_mj.control import Policy, TaskParameters
 from epuck_mj.errors import UserError
 from epuck_mj.tasks import START_CLEARANCE
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.wall_follower import YARDSTICK, WallFollower
 from evolution.config import ExperimentConfig, load_config
 from evolution.run_directory import RunDirectory
-from evolution.study_data import YARDSTICK
 from evolution.study_directory import champions
 
 LAST = "last"

@@ -4,7 +4,7 @@ The modules behind it do not know this one: `ask_tell` has the shared rules, one
 each the algorithms. The baselines beside the paper's are random search, (1+1)-ES and
 CMA-ES.
 
-    optimizer = make_optimizer(default_parameters("de-best"), space, rng)
+    optimizer = make_optimizer(config.optimizer, config.search_space, rng)
     while spent + optimizer.next_size() <= budget:
         genomes = optimizer.ask()
         optimizer.tell(evaluate(genomes))
@@ -30,12 +30,10 @@ from evolution.random_search import RandomSearch, RandomSearchParameters
 
 __all__ = [
     "ALGORITHMS",
-    "OPTIMIZERS",
     "AskTellError",
     "Optimizer",
     "OptimizerParameters",
     "SearchSpace",
-    "default_parameters",
     "make_optimizer",
 ]
 
@@ -44,7 +42,7 @@ class Optimizer(Protocol):
     """A population-based maximiser that asks for fitness and is told.
 
     Attributes:
-        name: its name in `OPTIMIZERS`.
+        name: the shipped experiment's with these parameters.
         population: genomes `(population, genes)` after the last tell, read-only; before
             the first tell the initial ones. As many as there are: it may grow.
         fitness: their stored fitness `(population,)`, read-only; -inf before the first
@@ -132,34 +130,6 @@ ALGORITHMS: Mapping[str, type[OptimizerParameters]] = {
     kind.algorithm: kind for kind in MAKERS
 }
 """The kinds of parameters by what configurations call their `algorithm`."""
-
-# The paper's three (section 4), what it leaves open at the project's defaults; then the
-# baselines at theirs.
-OPTIMIZERS: Mapping[str, OptimizerParameters] = {
-    "de-best": DifferentialEvolutionParameters(
-        strategy="best", population=150, scale=0.8, crossover=1.0
-    ),
-    "de-rand": DifferentialEvolutionParameters(
-        strategy="rand", population=120, scale=0.7, crossover=1.0
-    ),
-    "ga": GeneticAlgorithmParameters(),
-    "random-search": RandomSearchParameters(),
-    "one-plus-one-es": EvolutionStrategyParameters(),
-    "cma-es": CmaEsParameters(),
-}
-
-
-def default_parameters(name: str) -> OptimizerParameters:
-    """The parameters of the optimiser called `name`, the paper's if it is there.
-
-    Raises:
-        ValueError: no such optimiser.
-    """
-    if name not in OPTIMIZERS:
-        raise ValueError(
-            f"unknown optimiser {name!r}; available: {', '.join(OPTIMIZERS)}"
-        )
-    return OPTIMIZERS[name]
 
 
 def make_optimizer(

@@ -16,7 +16,6 @@ from epuck_mj.command_line import check_threads, command, main, parse
 from epuck_mj.controller import ControllerFile
 from epuck_mj.errors import UserError
 from epuck_mj.interruption import Interrupted, Interruption
-from epuck_mj.model import absolute
 from evolution.config import (
     DEFAULT_EXPERIMENT,
     ExperimentConfig,
@@ -122,13 +121,7 @@ def _options(argv: Sequence[str]) -> Options:
             f"the experiment comes first: {command(MODULE, options.experiment, '...')}"
         )
     # a run can be resumed from anywhere
-    config = options.config.model_copy(
-        update={
-            "robot": absolute(options.config.robot),
-            "arena": absolute(options.config.arena),
-        }
-    )
-    options = replace(options, config=config)
+    options = replace(options, config=options.config.located())
     if options.resume is not None and options.output is not None:
         raise UserError("expected --resume or --output, got both")
     return options

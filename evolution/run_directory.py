@@ -111,7 +111,7 @@ class RunDirectory:
             UserError: if there is none.
         """
         if not files.is_file(self.config):
-            raise UserError(f"nothing to resume: no '{self.config}'")
+            raise UserError(f"no run in '{self.path}': no '{self.config}'")
         return load_config(self.config)
 
     def refuse_other_config(self, config: ExperimentConfig) -> None:

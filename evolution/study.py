@@ -16,12 +16,11 @@ from epuck_mj import controller, files
 from epuck_mj.command_line import command, main, parse
 from epuck_mj.errors import UserError
 from epuck_mj.interruption import Interrupted, Interruption
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.wall_follower import YARDSTICK, WallFollower
 from evolution.execution import Means
 from evolution.jobs import Event, Job, carry_out_side_by_side
 from evolution.results import judges, scores
 from evolution.study_config import StudyConfig, find_study, parse_seeds
-from evolution.study_data import YARDSTICK
 from evolution.study_directory import StudyDirectory
 
 MODULE = "evolution.study"

@@ -5,13 +5,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Self
 
 import yaml
 
 from epuck_mj.errors import UserError
 from epuck_mj.files import is_file
-from epuck_mj.model import absolute
 from evolution.config import (
     CONFIGS,
     ExperimentConfig,
@@ -63,7 +62,7 @@ class StudyConfig:
                 raise UserError(f"'{path}': two experiments are called '{file.stem}'")
             fields = load_config(file).model_dump() | common
             config = ExperimentConfig.parsed(fields, f"'{path}', common")
-            experiments[file.stem] = _located(config)
+            experiments[file.stem] = config.located()
         return cls(MappingProxyType(experiments))
 
     def only(self, names: list[str]) -> Self:
@@ -121,15 +120,6 @@ class StudyConfig:
         if not experiments:
             raise UserError(f"'{path}': expected experiments, got none")
         return cls(MappingProxyType(experiments))
-
-
-def _located(config: ExperimentConfig) -> ExperimentConfig:
-    """The config with paths that mean the same from anywhere."""
-    paths: dict[str, Any] = {
-        "robot": absolute(config.robot),
-        "arena": absolute(config.arena),
-    }
-    return config.model_copy(update=paths)
 
 
 def find_study(study: str) -> Path:

@@ -13,14 +13,12 @@ from epuck_mj import controller
 from epuck_mj.control import TaskParameters
 from epuck_mj.controller import ControllerFile
 from epuck_mj.errors import UserError
+from epuck_mj.wall_follower import YARDSTICK
 from evolution.config import ExperimentConfig, differing_keys
 from evolution.experiment import HISTORY
 from evolution.run_directory import RunDirectory
 from evolution.study_config import seeds_text
 from evolution.study_directory import StudyDirectory
-
-YARDSTICK = "wall-follower"
-"""What the hand-written wall follower is called among the experiments."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ ROOT = Path(__file__).resolve().parent.parent
 MODULES = sorted([*ROOT.glob("epuck_mj/**/*.py"), *ROOT.glob("evolution/**/*.py")])
 
 LAYERS = [
-    {"errors", "constants"},
+    {"errors", "constants", "interruption"},
     {"sensors", "motors", "fitness", "controller", "files", "command_line"},
     {"control", "wall_follower", "model", "colors", "calibration", "pictures"},
     {"simulation", "geometry", "disturbances"},

@@ -21,7 +21,7 @@ from evolution.champion import choose_champion
 from evolution.config import ExperimentConfig, find_config, load_config
 from evolution.evaluation import ROUNDING, BatchEngine, Race, evaluate
 from evolution.experiment import Experiment
-from evolution.optimizer import OPTIMIZERS
+from tests.shipped import OPTIMIZERS
 
 SCENE = load_scene("epuck_planar", "arena")
 SPACE = FreeSpace(SCENE, 0.01)

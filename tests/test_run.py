@@ -31,10 +31,10 @@ from evolution import champion, execution, results
 from evolution.config import CONFIGS, ExperimentConfig, find_config, load_config
 from evolution.experiment import HISTORY
 from evolution.held_out import Judge
-from evolution.optimizer import OPTIMIZERS
 from evolution.run import run
 from evolution.run_directory import LOCK
 from tests.processes import python_process
+from tests.shipped import OPTIMIZERS
 
 TIMEOUT = 120
 """Seconds for what takes a few on a machine that does nothing else."""
@@ -519,8 +519,8 @@ def test_a_bad_experiment_file_is_refused(content, words, refusal, here):
         (["ga", "--robot", "nope"], ("no robot 'nope'", "epuck, epuck_planar")),
         (["ga", "--arena", "nope"], ("no arena 'nope'", "arena")),
         (["--resume"], ("--resume",)),
-        (["--resume", "nowhere"], ("nothing to resume", "nowhere/config.yaml")),
-        (["--resume", "a", "--output", "b", "ga"], ("nothing to resume",)),
+        (["--resume", "nowhere"], ("no run in 'nowhere'", "nowhere/config.yaml")),
+        (["--resume", "a", "--output", "b", "ga"], ("no run in 'a'",)),
     ],
 )
 def test_bad_arguments_are_refused(argv, words, refusal):

@@ -12,10 +12,10 @@ from epuck_mj import files
 from epuck_mj.errors import UserError
 from epuck_mj.model import MODELS
 from evolution.config import find_config, load_config
-from evolution.optimizer import OPTIMIZERS
 from evolution.run_directory import locked
 from evolution.study_config import StudyConfig, find_study, parse_seeds
 from evolution.study_directory import StudyDirectory
+from tests.shipped import OPTIMIZERS
 
 SHIPPED = ("paper", "quick", "wheels")
 GA = "optimizer: {algorithm: genetic_algorithm}\n"

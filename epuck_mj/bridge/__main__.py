@@ -19,10 +19,9 @@ from epuck_mj.control import Policy, TaskParameters
 from epuck_mj.controller import load
 from epuck_mj.errors import UserError
 from epuck_mj.model import load_scene
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.wall_follower import YARDSTICK, WallFollower
 
 MODULE = "epuck_mj.bridge"
-YARDSTICK = "wall-follower"
 SECONDS_MAX = 24 * 3600
 
 

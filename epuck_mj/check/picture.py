@@ -6,7 +6,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from epuck_mj.colors import GREEN, ORANGE
+from epuck_mj.colors import GREEN, ORANGE, fraction
 from epuck_mj.model import Scene
 from epuck_mj.outline import shell_outline, wall_outlines
 from epuck_mj.starts import Grid
@@ -27,7 +27,6 @@ def region_figure(scene: Scene, grid: Grid, title: str) -> Figure:
     color, meaning = (
         (GREEN, "may start") if enclosed else (ORANGE, "fits, not enclosed")
     )
-    rgb = (color[0] / 255, color[1] / 255, color[2] / 255)
     # half a node beyond the first and the last
     low = grid.origin - grid.spacing / 2
     high = low + grid.spacing * np.array(region.shape)
@@ -35,7 +34,7 @@ def region_figure(scene: Scene, grid: Grid, title: str) -> Figure:
     axes = figure.add_subplot()
     axes.imshow(
         np.where(region, 1.0, np.nan).T,
-        cmap=ListedColormap([rgb]),
+        cmap=ListedColormap([fraction(color)]),
         alpha=0.5,
         origin="lower",
         extent=(low[0], high[0], low[1], high[1]),
@@ -50,7 +49,7 @@ def region_figure(scene: Scene, grid: Grid, title: str) -> Figure:
         shell = shell + grid.nodes[grid.inside][-1]
         axes.fill(*shell.T, facecolor="none", edgecolor="black")
     legend = [
-        Patch(facecolor=rgb, alpha=0.5, label=f"robot's middle {meaning}"),
+        Patch(facecolor=fraction(color), alpha=0.5, label=f"robot's middle {meaning}"),
         Patch(facecolor=WALL, label="walls"),
     ]
     figure.legend(handles=legend, loc="outside lower center", ncols=2, frameon=False)

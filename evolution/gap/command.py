@@ -38,7 +38,7 @@ class Options:
 
     Attributes:
         paths: run or study directories, controller files, or wall-follower.
-        output: folder to write gap.md, gap.json, gap.csv and figures into.
+        output: folder to write gap.md, summary.md, gap.json, gap.csv and figures into.
         worlds: how many.
         starts: test starts in each world, and at home.
         robot: robot that drives; both shipped ones if not given.

@@ -6,9 +6,9 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from epuck_mj.colors import TRIALS
+from epuck_mj.colors import TRIALS, fraction
 from evolution.gap.transfer import SHARE_KEPT, Transfer
-from evolution.report.figures.style import PAGE, PRINT, color
+from evolution.report.figures.style import PAGE, PRINT
 from evolution.report.words import ROBOTS
 
 LINES = ("-", (0, (7, 2)), (0, (2, 1.5)), (0, (7, 1.5, 1.2, 1.5)))
@@ -38,7 +38,7 @@ def kept_figure(
                     [1, *at_least],
                     where="pre",
                     label=f"{group} (n = {len(members)})",
-                    color=color(TRIALS[i % len(TRIALS)]),
+                    color=fraction(TRIALS[i % len(TRIALS)]),
                     linestyle=LINES[i % len(LINES)],
                     lw=1.4,
                 )

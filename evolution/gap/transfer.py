@@ -78,7 +78,7 @@ class Transfer:
 
 @dataclass(frozen=True)
 class Verdict:
-    """One policy, or the median one of several, in all worlds.
+    """One policy in all worlds.
 
     Attributes:
         home: mean step fitness at home.

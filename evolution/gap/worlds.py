@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
+from epuck_mj import disturbances
 from epuck_mj.constants import (
     N_PROXIMITY,
     N_WHEELS,
@@ -13,6 +14,7 @@ from epuck_mj.constants import (
     WHEEL_RADIUS,
 )
 from epuck_mj.disturbances import Disturbances
+from evolution.experiment import random_generator
 
 WORLD_SEED = 0
 """Of the worlds: the same for every champion and every study."""
@@ -59,20 +61,20 @@ RANGES: dict[str, tuple[float, float]] = {
     "curve": (np.log(1 / 1.5), np.log(1.5)),
     "gain_spread": (0.0, 0.25),
     "count_noise": (0.0, 3.0),
-    "wheel_radius": (0.0200, 0.0207),
+    "wheel_radius": disturbances.RANGES.wheel_radius,
     "bias": (-0.03, 0.03),
-    "track": (0.051, 0.057),
+    "track": disturbances.RANGES.track,
     "slip": (0.0, 0.06),
-    "mass": (0.93, 1.07),
-    "friction": (0.7, 1.2),
+    "mass": disturbances.RANGES.mass,
+    "friction": disturbances.RANGES.friction,
 }
 """Lowest and highest of what is continuous.
 
-Source: the figures of books and drivers differ by so much, and so do the gains of eight
-sensors of two robots.
+Source: the figures of books and drivers differ by so much (those of randomised robots
+in evolution), and so do the gains of eight sensors of two robots.
 """
 
-LATENCY_MAX = 3
+LATENCY_MAX = disturbances.RANGES.latency[1]
 
 
 def worlds(n: int) -> list[World]:
@@ -101,8 +103,7 @@ def met(world: World, index: int, n: int, steps: int) -> Disturbances:
         n: number of trials.
         steps: of a trial.
     """
-    key = np.random.SeedSequence(WORLD_SEED, spawn_key=(index,))
-    rng = np.random.default_rng(key)
+    rng = random_generator(WORLD_SEED, index)
     # one robot in all trials: only its noise is new
     gains = world.curve * np.exp(world.gain_spread * rng.standard_normal(N_PROXIMITY))
     age = rng.uniform(0, PROXIMITY_PERIOD, N_PROXIMITY)

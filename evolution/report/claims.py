@@ -106,7 +106,7 @@ def mean_to_best(study: StudyData, name: str) -> np.ndarray:
 
 
 def maturity(study: StudyData, name: str) -> np.ndarray:
-    """Share of the budget after which a run has 90 % of its final best, `(runs,)`."""
+    """Share of what it spent after which a run has 90 % of its best, `(runs,)`."""
     shares = []
     for run in study.runs[name]:
         best = np.maximum.accumulate(run.history["best"])

@@ -10,6 +10,7 @@ import tyro
 from epuck_mj import files
 from epuck_mj.command_line import parse
 from epuck_mj.errors import UserError
+from epuck_mj.wall_follower import YARDSTICK
 from evolution.report.blocks import (
     FIGURES,
     Block,
@@ -27,7 +28,7 @@ from evolution.report.pairs import PairRow, pair_rows
 from evolution.report.successes import SuccessRow, success_rows
 from evolution.report.summary import summary, summary_text
 from evolution.report.tables import TargetRow, csv_text, run_rows, target_rows
-from evolution.study_data import YARDSTICK, StudyData, load_study
+from evolution.study_data import StudyData, load_study
 
 MODULE = "evolution.report"
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from epuck_mj.wall_follower import YARDSTICK
 from evolution.report.blocks import (
     Block,
     Code,
@@ -24,7 +25,7 @@ from evolution.report.samples import kept, most_believed
 from evolution.report.tables import shown_robots
 from evolution.report.words import label, median_and_quartiles, spread
 from evolution.study_config import StudyConfig, find_study
-from evolution.study_data import YARDSTICK, StudyData
+from evolution.study_data import StudyData
 
 DIFFERENCES = (
     ("simulator", "Player/Stage, 2D", "MuJoCo, 3D; planar robot, tested on wheels"),

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from epuck_mj.behaviour_classes import HUG
-from evolution.config import ExperimentConfig
+from epuck_mj.wall_follower import YARDSTICK
+from evolution.config import ExperimentConfig, flat
 from evolution.report.pairs import pair_rows
 from evolution.report.samples import (
     class_means,
@@ -34,24 +35,17 @@ from evolution.study_data import StudyData
 
 def config_differences(data: StudyData) -> dict[str, dict[str, Any]]:
     """Keys in which the experiments differ, and the value of each that has it."""
-    flat = {name: _flat(config) for name, config in data.configs.items()}
-    keys = dict.fromkeys(key for fields in flat.values() for key in fields)
+    each = {name: _keys(config) for name, config in data.configs.items()}
+    keys = dict.fromkeys(key for fields in each.values() for key in fields)
     found = {
-        key: {name: fields[key] for name, fields in flat.items() if key in fields}
+        key: {name: fields[key] for name, fields in each.items() if key in fields}
         for key in keys
     }
     return {
         key: values
         for key, values in found.items()
-        if len(values) < len(flat) or len(set(map(repr, values.values()))) > 1
+        if len(values) < len(each) or len(set(map(repr, values.values()))) > 1
     }
-
-
-def _flat(config: ExperimentConfig) -> dict[str, Any]:
-    """Keys and values but the seed, the optimiser's as `optimizer.<key>`."""
-    fields = config.model_dump(exclude={"seed", "optimizer"})
-    optimizer = config.model_dump(include={"optimizer"})["optimizer"]
-    return fields | {f"optimizer.{key}": value for key, value in optimizer.items()}
 
 
 def commands(data: StudyData, output: str, ioh: bool) -> dict[str, str]:
@@ -66,9 +60,10 @@ def commands(data: StudyData, output: str, ioh: bool) -> dict[str, str]:
         "held-out fitness and behaviour of every champion": command_line(
             "evolution.evaluate", study
         ),
-        "the hand-written wall follower": command_line(
-            "evolution.evaluate", "wall-follower"
+        "whether they and the most believed score the same here": command_line(
+            "evolution.verify", study
         ),
+        "the hand-written wall follower": command_line("evolution.evaluate", YARDSTICK),
         "one run, byte for byte (any other likewise)": command_line(
             "evolution.run",
             (run.path / "config.yaml").as_posix(),
@@ -94,7 +89,7 @@ def summary(data: StudyData, output: str, ioh: bool) -> dict[str, Any]:
             "missing": list(data.missing),
             "experiments": {name: _experiment(data, name) for name in data.configs},
             "config_differences": config_differences(data),
-            "configs": {name: _flat(config) for name, config in data.configs.items()},
+            "configs": {name: _keys(config) for name, config in data.configs.items()},
             "yardstick": data.yardstick,
             "runs": run_rows(data),
             "pairwise": list(map(asdict, pair_rows(data))),
@@ -149,6 +144,10 @@ def _experiment(data: StudyData, name: str) -> dict[str, Any]:
         ),
         "rank_correlation_between_robots": rank if first != last else None,
     }
+
+
+def _keys(config: ExperimentConfig) -> dict[str, Any]:
+    return {key: value for key, value in flat(config).items() if key != "seed"}
 
 
 def _described(sample: np.ndarray) -> dict[str, float] | None:

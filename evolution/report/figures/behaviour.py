@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from epuck_mj import colors
+from epuck_mj.colors import fraction
 from epuck_mj.model import load_scene
 from epuck_mj.starts import FreeSpace
 from epuck_mj.trajectory import record
@@ -22,7 +23,6 @@ from evolution.report.figures.style import (
     PAGE,
     PRINT,
     Color,
-    color,
     counted,
     legend_below,
     robot_panels,
@@ -38,14 +38,14 @@ MOST_CHAMPIONS = 3
 
 CLASS_LOOKS: MappingProxyType[str, tuple[Color, str]] = MappingProxyType(
     {
-        "wall follower": (color(colors.BLUE), ""),
-        "hugger": (color(colors.SKY), "////"),
-        "circler": (color(colors.GREEN), "----"),
-        "bouncer": (color(colors.ORANGE), "\\\\\\\\"),
-        "searcher": (color(colors.YELLOW), ""),
-        "spinner": (color(colors.PURPLE), "xxxx"),
-        "stuck": (color(colors.GREY), ""),
-        "crashed": (color(colors.VERMILION), "||||"),
+        "wall follower": (fraction(colors.BLUE), ""),
+        "hugger": (fraction(colors.SKY), "////"),
+        "circler": (fraction(colors.GREEN), "----"),
+        "bouncer": (fraction(colors.ORANGE), "\\\\\\\\"),
+        "searcher": (fraction(colors.YELLOW), ""),
+        "spinner": (fraction(colors.PURPLE), "xxxx"),
+        "stuck": (fraction(colors.GREY), ""),
+        "crashed": (fraction(colors.VERMILION), "||||"),
     }
 )
 """Fill and hatch of each class of behaviour; any other is white."""
@@ -193,7 +193,7 @@ def _stack(axes: Axes, row: int, shares: dict[str, float]) -> None:
 
 def _fill(name: str) -> dict[str, Any]:
     """Arguments of the patch of a class of behaviour."""
-    fill, hatch = CLASS_LOOKS.get(name, (color((255, 255, 255)), ""))
+    fill, hatch = CLASS_LOOKS.get(name, ((1.0, 1.0, 1.0), ""))
     return {"facecolor": fill, "hatch": hatch, "edgecolor": "black", "linewidth": 0.4}
 
 

@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from epuck_mj import colors
+from epuck_mj.colors import fraction
 from evolution.report.words import label, robot_name
 from evolution.study_data import StudyData
 
@@ -50,12 +51,6 @@ Color = tuple[float, float, float]
 Dashes = tuple[float, tuple[float, ...]] | str
 
 
-def color(rgb: tuple[int, int, int]) -> Color:
-    """A colour as matplotlib has it: it counts to 1."""
-    red, green, blue = rgb
-    return red / 255, green / 255, blue / 255
-
-
 @dataclass(frozen=True)
 class Look:
     """How an experiment is drawn in every figure.
@@ -73,12 +68,12 @@ class Look:
 
 LOOKS: MappingProxyType[str, Look] = MappingProxyType(
     {
-        "de-best": Look(color(colors.BLUE), "-", "o"),
-        "de-rand": Look(color(colors.VERMILION), (0, (7, 2)), "s"),
-        "ga": Look(color(colors.GREEN), (0, (7, 1.5, 1.2, 1.5)), "^"),
-        "cma-es": Look(color(colors.PURPLE), (0, (3, 1.2)), "D"),
-        "one-plus-one-es": Look(color(colors.ORANGE), (0, (4, 1, 1, 1, 1, 1)), "v"),
-        "random-search": Look(color(colors.GREY), (0, (1, 1)), ">"),
+        "de-best": Look(fraction(colors.BLUE), "-", "o"),
+        "de-rand": Look(fraction(colors.VERMILION), (0, (7, 2)), "s"),
+        "ga": Look(fraction(colors.GREEN), (0, (7, 1.5, 1.2, 1.5)), "^"),
+        "cma-es": Look(fraction(colors.PURPLE), (0, (3, 1.2)), "D"),
+        "one-plus-one-es": Look(fraction(colors.ORANGE), (0, (4, 1, 1, 1, 1, 1)), "v"),
+        "random-search": Look(fraction(colors.GREY), (0, (1, 1)), ">"),
     }
 )
 """Shipped experiments; any other takes a spare look."""
@@ -108,7 +103,7 @@ def looks(data: StudyData) -> dict[str, Look]:
             found[name] = LOOKS[name]
         else:
             rgb, (dashes, marker) = next(spare)
-            found[name] = Look(color(rgb), dashes, marker)
+            found[name] = Look(fraction(rgb), dashes, marker)
     return found
 
 

@@ -1,0 +1,9 @@
+"""The shipped optimisers: the paper's three and the baselines, by experiment."""
+
+from evolution.config import find_config, load_config
+
+PAPERS = ("de-best", "de-rand", "ga")
+BASELINES = ("random-search", "one-plus-one-es", "cma-es")
+OPTIMIZERS = {
+    name: load_config(find_config(name)).optimizer for name in (*PAPERS, *BASELINES)
+}
