@@ -1,0 +1,76 @@
+"""`evolution.reproduce`: study, report and claims by one command, and again."""
+
+from pathlib import Path
+
+import pytest
+
+from epuck_mj.errors import UserError
+from evolution import reproduce as module
+from evolution.report.verdicts import OTHER_STUDY
+from evolution.reproduce import reproduce
+
+TINY = """
+experiments: [ga.yaml, de-best.yaml]
+common: {evaluations: 20, steps: 20, trials: 2}
+"""
+EXPERIMENTS = {
+    "ga": "optimizer: {algorithm: genetic_algorithm, population: 10}",
+    "de-best": "optimizer: {algorithm: differential_evolution, population: 10, "
+    "strategy: best, scale: 0.8, crossover: 1.0}",
+}
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A working directory with a study of a second as the quick one."""
+    monkeypatch.chdir(tmp_path)
+    Path("tiny").write_text(TINY)
+    for name, text in EXPERIMENTS.items():
+        Path(f"{name}.yaml").write_text(text)
+    monkeypatch.setattr(module, "QUICK", (("tiny", "1-2"),))
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_one_command_runs_reports_and_judges_and_goes_on(here, capfd):
+    assert reproduce(["--quick", "--output", "out"]) == 0
+    first = (here / "out" / "REPRODUCTION.md").read_text()
+    assert "python -m evolution.reproduce --quick --output out" in first
+    # it is another study than the paper's, and says so
+    assert first.count(OTHER_STUDY) > 16
+    assert "evaluations (stored 30000, got 20)" in first
+    assert "Missing: no such study was given." in first
+    for name in ("report.md", "report.html", "summary.json", "pairwise.csv"):
+        assert (here / "out" / "report-tiny" / name).is_file()
+    runs = sorted((here / "out" / "tiny").glob("*/*/champion.json"))
+    assert len(runs) == 4
+    # again: what is done is not done once more
+    before = [path.stat().st_mtime_ns for path in runs]
+    assert reproduce(["--quick", "--output", "out"]) == 0
+    assert [path.stat().st_mtime_ns for path in runs] == before
+    assert (here / "out" / "REPRODUCTION.md").read_text() == first
+    # a run that cannot be done, somebody's own files are there, stops nothing else
+    thesis = here / "out" / "tiny" / "ga" / "seed-2" / "thesis.tex"
+    for path in thesis.parent.iterdir():
+        path.unlink()
+    thesis.write_text("years of work")
+    assert reproduce(["--quick", "--output", "out"]) == 1
+    assert "ga seed 2 failed" in capfd.readouterr().err
+    text = (here / "out" / "REPRODUCTION.md").read_text()
+    assert "- ga seed 2: not finished" in text
+    assert thesis.read_text() == "years of work"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--quick", "--full"], "expected one of --quick, --full and --study"),
+        (["--full", "--study", "x"], "expected one of --quick, --full and --study"),
+        (["--wheels", "x"], "expected --study with --wheels"),
+        (["--study", "nowhere"], "'nowhere' is not a study"),
+    ],
+)
+def test_bad_input(here, arguments, message):
+    with pytest.raises(UserError, match=message) as caught:
+        reproduce(arguments)
+    assert "\n" not in str(caught.value)
