@@ -133,6 +133,11 @@ class Trials:
     crashed: np.ndarray
 
 
+Seen = Callable[[int, np.ndarray, ControlStep], None]
+"""Told of a control step: its number, which trials `(active,)` it was one of, and what
+came of it for each of them."""
+
+
 class BatchPolicy(Protocol):
     """A policy with one member per robot, from which members can be picked."""
 
@@ -140,8 +145,8 @@ class BatchPolicy(Protocol):
         """Actions `(robots, 2)` for observations `(robots, 8)`."""
         ...
 
-    def __getitem__(self, index: np.ndarray) -> "BatchPolicy":
-        """The members that a mask `(robots,)` names."""
+    def __getitem__(self, index: np.ndarray | slice) -> "BatchPolicy":
+        """The members that a mask `(robots,)` or a slice names."""
         ...
 
 
@@ -151,6 +156,7 @@ def run_trials(
     starts: np.ndarray,
     task: TaskParameters,
     lost: Lost | None = None,
+    seen: Seen | None = None,
 ) -> Trials:
     """One trial per start; a robot that crashes is not stepped again.
 
@@ -161,6 +167,7 @@ def run_trials(
         task: what a trial is.
         lost: asked after every step which trials to break off, uncrashed, with what
             they have earned so far; None lets all of them live.
+        seen: told of every step; None if nobody watches.
     """
     n_trials = len(starts)
     fitness = np.zeros(n_trials)
@@ -168,16 +175,18 @@ def run_trials(
     crashed = np.zeros(n_trials, bool)
     active = np.arange(n_trials)
     observation = observe(robots.reset(starts).distance, task.sensor_range)
-    for left in reversed(range(task.steps)):
+    for k in range(task.steps):
         step = control_step(robots, policy, observation, task)
         observation = step.observation
+        if seen is not None:
+            seen(k, active, step)
         fitness[active] += step.fitness
         steps[active] += 1
         alive = ~step.reading.contact
         crashed[active] = ~alive
         if lost is not None:
             most = fitness.copy()
-            most[active[alive]] += left * STEP_FITNESS_MAX
+            most[active[alive]] += (task.steps - 1 - k) * STEP_FITNESS_MAX
             alive &= ~lost(most)[active]
         # those who are done leave; everything kept per robot follows
         if not alive.all():

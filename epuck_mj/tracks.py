@@ -7,10 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from epuck_mj.control import BatchPolicy, TaskParameters, control_step
+from epuck_mj.control import (
+    BatchPolicy,
+    ControlStep,
+    Seen,
+    TaskParameters,
+    run_trials,
+)
 from epuck_mj.disturbances import Disturbances
-from epuck_mj.disturbed_robots import DisturbedRobots, disturbed
-from epuck_mj.sensors import observe
+from epuck_mj.disturbed_robots import disturbed
 from epuck_mj.simulation import SimulatedRobots
 
 
@@ -85,38 +90,29 @@ def record_tracks(
         steps=np.zeros(n, int),
         crashed=np.zeros(n, bool),
     )
-    group = np.arange(n) // robots.capacity
-    for members in (group == i for i in range(group.max(initial=-1) + 1)):
+    tracks.pose[:, 0] = robots.scene.poses(robots.scene.qpos(starts))
+    for first in range(0, n, robots.capacity):
+        members = slice(first, first + robots.capacity)
         met = None if disturbances is None else disturbances[members]
-        mine = disturbed(robots, met, task.control_step)
-        _record(mine, policy[members], starts, task, tracks, np.flatnonzero(members))
+        trials = run_trials(
+            disturbed(robots, met, task.control_step),
+            policy[members],
+            starts[members],
+            task,
+            seen=_recorder(robots, tracks, members),
+        )
+        tracks.steps[members], tracks.crashed[members] = trials.steps, trials.crashed
     return tracks
 
 
-def _record(
-    robots: SimulatedRobots | DisturbedRobots,
-    policy: BatchPolicy,
-    starts: np.ndarray,
-    task: TaskParameters,
-    tracks: Tracks,
-    active: np.ndarray,
-) -> None:
-    """Fill in the trials of indices `active`, one robot and one policy member each."""
-    observation = observe(robots.reset(starts[active]).distance, task.sensor_range)
-    tracks.pose[active, 0] = robots.poses()
-    for k in range(task.steps):
-        step = control_step(robots, policy, observation, task)
-        observation = step.observation
-        tracks.pose[active, k + 1] = robots.poses()
-        tracks.command[active, k] = step.command
-        tracks.fitness[active, k] = step.fitness
-        tracks.steps[active] += 1
-        alive = ~step.reading.contact
-        tracks.crashed[active] = ~alive
-        # those who are done leave; everything kept per robot follows
-        if not alive.all():
-            active, observation = active[alive], observation[alive]
-            if not active.size:
-                break
-            policy = policy[alive]
-            robots.keep(alive)
+def _recorder(robots: SimulatedRobots, tracks: Tracks, members: slice) -> Seen:
+    """Writes every step of those members into their tracks."""
+    pose, command = tracks.pose[members], tracks.command[members]
+    fitness = tracks.fitness[members]
+
+    def seen(k: int, active: np.ndarray, step: ControlStep) -> None:
+        pose[active, k + 1] = robots.poses()
+        command[active, k] = step.command
+        fitness[active, k] = step.fitness
+
+    return seen

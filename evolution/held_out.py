@@ -71,7 +71,7 @@ class Everybody:
         """Actions `(robots, 2)` for observations `(robots, 8)`."""
         return self._policy(observation)
 
-    def __getitem__(self, index: np.ndarray) -> Self:
+    def __getitem__(self, index: np.ndarray | slice) -> Self:
         """Itself."""
         return self
 
