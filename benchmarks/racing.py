@@ -12,19 +12,16 @@ import statistics
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 import tyro
 
 from epuck_mj import files
 from epuck_mj.command_line import main, parse
 from epuck_mj.control import Trials
-from epuck_mj.controller import Controller
-from epuck_mj.disturbances import Disturbances
 from evolution.config import find_config, load_config
-from evolution.evaluation import BatchEngine, Race
+from evolution.evaluation import BatchEngine, Work
 from evolution.experiment import Experiment
 from evolution.study_config import parse_seeds
 
@@ -59,26 +56,21 @@ class BothWays:
         self.steps = {True: 0, False: 0}
         self.seconds = {True: 0.0, False: 0.0}
 
-    def run(
-        self,
-        controller: Controller,
-        starts: np.ndarray,
-        race: Race | None = None,
-        disturbances: Disturbances | None = None,
-    ) -> Trials:
+    def run(self, work: Work) -> Trials:
         """See `Engine.run`."""
         sampled = self._generation % EVERY == 0
         self._generation += 1
         if sampled:
-            self._timed(True, controller, starts, None, disturbances)
-        return self._timed(sampled, controller, starts, race, disturbances)
+            self._timed(True, replace(work, race=None))
+        return self._timed(sampled, work)
 
-    def _timed(self, counted: bool, controller, starts, race, disturbances) -> Trials:
+    def _timed(self, counted: bool, work: Work) -> Trials:
         started = time.perf_counter()
-        trials = self._engine.run(controller, starts, race, disturbances)
+        trials = self._engine.run(work)
         if counted:
-            self.seconds[race is not None] += time.perf_counter() - started
-            self.steps[race is not None] += int(trials.steps.sum())
+            raced = work.race is not None
+            self.seconds[raced] += time.perf_counter() - started
+            self.steps[raced] += int(trials.steps.sum())
         return trials
 
 

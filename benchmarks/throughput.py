@@ -28,7 +28,7 @@ from epuck_mj.controller import Controller, Network
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.starts import FreeSpace
 from epuck_mj.tasks import FollowWalls, environment
-from evolution.evaluation import BatchEngine
+from evolution.evaluation import BatchEngine, Work
 
 ROBOTS = ("epuck", "epuck_planar")
 N_ROBOTS = 750
@@ -145,7 +145,7 @@ def _batch(
     task: TaskParameters,
 ) -> int:
     """Control steps of our evaluator: a generation, policy and fitness included."""
-    trials = engine.run(controller, starts)
+    trials = engine.run(Work(controller, starts))
     assert trials.steps.min() == task.steps, "a crash would spoil the measurement"
     return int(trials.steps.sum())
 

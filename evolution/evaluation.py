@@ -9,7 +9,7 @@ what it has to has lived all its trials, so no comparison comes out differently.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -81,21 +81,52 @@ class Race:
         return Race(self.to_beat[first:last], self.trials)
 
 
+@dataclass(frozen=True)
+class Work:
+    """Trials `(n,)` to be lived.
+
+    Attributes:
+        controller: one per trial.
+        starts: poses `(n, 3)`: x, y [m], yaw [rad].
+        race: which trials may be broken off; None if none may.
+        disturbances: of the trials; None for ideal robots.
+    """
+
+    controller: Controller
+    starts: np.ndarray
+    race: Race | None = None
+    disturbances: Disturbances | None = None
+
+    def __len__(self) -> int:
+        """Number of trials."""
+        return len(self.starts)
+
+    def __getitem__(self, chunk: slice) -> "Work":
+        """Some of the trials; in a race, of whole individuals."""
+        race, met = self.race, self.disturbances
+        return Work(
+            self.controller[chunk],
+            self.starts[chunk],
+            None if race is None else race[chunk],
+            None if met is None else met[chunk],
+        )
+
+    def chunks(self, most: int) -> Iterator["Work"]:
+        """The same in parts of at most so many trials.
+
+        Individuals that race stay whole: they win or lose by all their trials.
+        """
+        whole = 1 if self.race is None else self.race.trials
+        size = max(whole, most - most % whole)
+        for first in range(0, len(self), size):
+            yield self[first : min(first + size, len(self))]
+
+
 class Engine(Protocol):
     """Runs one trial per member of a batch of controllers."""
 
-    def run(
-        self,
-        controller: Controller,
-        starts: np.ndarray,
-        race: Race | None = None,
-        disturbances: Disturbances | None = None,
-    ) -> Trials:
-        """Outcome of `(n,)` trials of `(n,)` controllers on `(n, 3)` starts.
-
-        With a `race`, trials of individuals that can only lose may be broken off.
-        Without `disturbances`, robots are ideal.
-        """
+    def run(self, work: Work) -> Trials:
+        """Outcome of `(n,)` trials."""
         ...
 
 
@@ -107,31 +138,20 @@ class BatchEngine:
         self._task = task
         self._robots = SimulatedRobots(scene, CAPACITY, threads)
 
-    def run(
-        self,
-        controller: Controller,
-        starts: np.ndarray,
-        race: Race | None = None,
-        disturbances: Disturbances | None = None,
-    ) -> Trials:
+    def run(self, work: Work) -> Trials:
         """See `Engine.run`."""
-        trials = 1 if race is None else race.trials
-        if trials > self._robots.capacity:
+        if work.race is not None and work.race.trials > self._robots.capacity:
             # an individual does not fit: nobody is broken off
-            trials, race = 1, None
+            work = replace(work, race=None)
         parts = [
             run_trials(
-                disturbed(
-                    self._robots,
-                    None if disturbances is None else disturbances[chunk],
-                    self._task.control_step,
-                ),
-                controller[chunk],
-                starts[chunk],
+                disturbed(self._robots, part.disturbances, self._task.control_step),
+                part.controller,
+                part.starts,
                 self._task,
-                None if race is None else race[chunk].lost,
+                None if part.race is None else part.race.lost,
             )
-            for chunk in chunks(len(starts), trials, self._robots.capacity)
+            for part in work.chunks(self._robots.capacity)
         ]
         return joined(parts)
 
@@ -144,27 +164,20 @@ class DmControlEngine:
         self._scene = scene
         self._task = task
 
-    def run(
-        self,
-        controller: Controller,
-        starts: np.ndarray,
-        race: Race | None = None,
-        disturbances: Disturbances | None = None,
-    ) -> Trials:
+    def run(self, work: Work) -> Trials:
         """See `Engine.run`; every trial is lived to its end, by an ideal robot.
 
         Raises:
             ValueError: if there are disturbances.
         """
-        if disturbances is not None:
+        if work.disturbances is not None:
             raise ValueError("expected no disturbances: dm_control has ideal robots")
-        task = FollowWalls(self._scene, self._task, starts=starts)
-        env = environment(self._scene, task)
-        fitness = np.zeros(len(starts))
-        steps = np.zeros(len(starts), int)
-        crashed = np.zeros(len(starts), bool)
-        for i in range(len(starts)):
-            policy, time_step = controller[i], env.reset()
+        task = FollowWalls(self._scene, self._task, starts=work.starts)
+        env, n = environment(self._scene, task), len(work)
+        fitness, steps = np.zeros(n), np.zeros(n, int)
+        crashed = np.zeros(n, bool)
+        for i in range(n):
+            policy, time_step = work.controller[i], env.reset()
             while not time_step.last():
                 time_step = env.step(policy(time_step.observation["proximity"]))
                 fitness[i] += time_step.reward
@@ -197,19 +210,12 @@ def evaluate(
     race = None if to_beat is None else Race(to_beat, len(starts))
     everybody = None if disturbances is None else disturbances.tiled(len(genomes))
     everywhere = np.tile(starts, (len(genomes), 1))
-    trials = engine.run(controller, everywhere, race, everybody)
+    trials = engine.run(Work(controller, everywhere, race, everybody))
     return Evaluation(
         trials.fitness.reshape(shape),
         trials.steps.reshape(shape),
         trials.crashed.reshape(shape),
     )
-
-
-def chunks(n: int, whole: int, most: int = CAPACITY) -> Iterator[slice]:
-    """Slices of `n` trials, `most` of them at most; groups of `whole` stay together."""
-    size = max(whole, most - most % whole)
-    for first in range(0, n, size):
-        yield slice(first, min(first + size, n))
 
 
 def joined(parts: Sequence[Trials]) -> Trials:

@@ -27,7 +27,7 @@ from epuck_mj.sensors import proximity
 from epuck_mj.simulation import SimulatedRobots
 from evolution import evaluation
 from evolution.config import ExperimentConfig
-from evolution.evaluation import BatchEngine, DmControlEngine, evaluate
+from evolution.evaluation import BatchEngine, DmControlEngine, Work, evaluate
 from evolution.experiment import Experiment, make_engine
 
 TASK = TaskParameters(steps=40)
@@ -307,9 +307,8 @@ def test_what_makes_no_sense_is_refused():
     with pytest.raises(UserError, match=r"ideal robots only.*calibrated"):
         make_engine("dm_control", scene, CONFIG, 1)
     with pytest.raises(ValueError, match="no disturbances"):
-        DmControlEngine(scene, TASK).run(
-            Network().decode(genomes(1)), STARTS[:1], None, drawn(1)
-        )
+        work = Work(Network().decode(genomes(1)), STARTS[:1], None, drawn(1))
+        DmControlEngine(scene, TASK).run(work)
     robots = robots_on(scene, STARTS, drawn(2))
     with pytest.raises(ValueError, match="expected 2 starts, got 3"):
         robots.reset(STARTS)

@@ -66,9 +66,9 @@ class Watched:
         self.engine = engine
         self.calls = []
 
-    def run(self, controller, starts, race=None, disturbances=None):
-        trials = self.engine.run(controller, starts, race, disturbances)
-        self.calls.append((controller, starts.copy(), trials))
+    def run(self, work):
+        trials = self.engine.run(work)
+        self.calls.append((work.controller, work.starts.copy(), trials))
         return trials
 
 

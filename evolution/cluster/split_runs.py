@@ -5,16 +5,12 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 
-import numpy as np
-
 from epuck_mj.control import TaskParameters, Trials
-from epuck_mj.controller import Controller
-from epuck_mj.disturbances import Disturbances
 from epuck_mj.model import load_scene
 from evolution.cluster.connection import Cluster, ClusterLost
 from evolution.cluster.world import World, world_of
 from evolution.config import ExperimentConfig
-from evolution.evaluation import CAPACITY, BatchEngine, Race, chunks, joined
+from evolution.evaluation import CAPACITY, BatchEngine, Work, joined
 from evolution.execution import Means
 from evolution.jobs import Event, Job, failure_log, failure_of, generations
 
@@ -59,47 +55,23 @@ class ClusterEngine:
         """Its name in a run's provenance."""
         return "cluster"
 
-    def run(
-        self,
-        controller: Controller,
-        starts: np.ndarray,
-        race: Race | None = None,
-        disturbances: Disturbances | None = None,
-    ) -> Trials:
+    def run(self, work: Work) -> Trials:
         """See `Engine.run`.
 
         Raises:
             UserError: if the cluster is lost, or a worker refuses.
         """
         n_chunks = CHUNKS_PER_THREAD * max(1, self._cluster.n_threads())
-        most = min(CAPACITY, math.ceil(len(starts) / n_chunks))
-        # individuals stay whole: they win or lose by all their trials
-        whole = 1 if race is None else race.trials
+        most = min(CAPACITY, math.ceil(len(work) / n_chunks))
         futures = [
-            self._cluster.submit(
-                "trials",
-                _trials,
-                self._world,
-                self._task,
-                controller[chunk],
-                starts[chunk],
-                None if race is None else race[chunk],
-                None if disturbances is None else disturbances[chunk],
-            )
-            for chunk in chunks(len(starts), whole, most)
+            self._cluster.submit("trials", _trials, self._world, self._task, part)
+            for part in work.chunks(most)
         ]
         return joined(self._cluster.results(futures))
 
 
-def _trials(
-    world: World,
-    task: TaskParameters,
-    controller: Controller,
-    starts: np.ndarray,
-    race: Race | None,
-    disturbances: Disturbances | None,
-) -> Trials:
-    """On a worker: `Engine.run` of a chunk."""
+def _trials(world: World, task: TaskParameters, part: Work) -> Trials:
+    """On a worker: `Engine.run` of a part of the work."""
     # a thread's own: an engine runs one batch at a time
     engines = _kept.__dict__.setdefault("engines", {})
     if (world, task) not in engines:
@@ -108,7 +80,7 @@ def _trials(
             engines.clear()
         scene = load_scene(world.robot, world.arena, world.control_step)
         engines[world, task] = BatchEngine(scene, task, threads=1)
-    return engines[world, task].run(controller, starts, race, disturbances)
+    return engines[world, task].run(part)
 
 
 _kept = threading.local()
