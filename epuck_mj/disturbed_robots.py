@@ -48,11 +48,6 @@ class DisturbedRobots:
         self._disturbances = disturbances
         self._share = disturbances.age / control_step
 
-    @property
-    def capacity(self) -> int:
-        """The most robots that a reset can place."""
-        return self._robots.capacity
-
     def reset(self, starts: np.ndarray) -> Reading:
         """See `SimulatedRobots.reset`.
 

@@ -95,7 +95,12 @@ def check_writable(path: Path) -> None:
 
 def leftovers(folder: Path) -> list[Path]:
     """Temporary files of writers that were killed."""
-    return list(folder.glob(f".*-????????{TEMPORARY}"))
+    return [path for path in folder.iterdir() if is_leftover(path)]
+
+
+def is_leftover(path: Path) -> bool:
+    """Whether it is, or will be, one of those."""
+    return path.match(f".*-????????{TEMPORARY}")
 
 
 def remove_leftovers(folder: Path) -> None:

@@ -84,3 +84,13 @@ class Interruption:
         if self._raises:
             self._raises = False
             raise Interrupted
+
+
+@contextmanager
+def deaf_to_interrupts() -> Iterator[None]:
+    """Processes started in the block ignore Ctrl-C: their parent ends them."""
+    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)

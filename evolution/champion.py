@@ -42,7 +42,7 @@ def starts_for_test(space: FreeSpace, n: int = N_TEST) -> np.ndarray:
 def held_out_disturbances(
     config: ExperimentConfig, purpose: Purpose, n: int
 ) -> Disturbances | None:
-    """What champions of an experiment meet in their first `n` trials of a purpose."""
+    """What champions of an experiment meet in `n` trials; of fewer, something else."""
     conditions, steps = config.conditions, config.steps
     return disturbances(conditions, n, steps, HELD_OUT_SEED, purpose)
 

@@ -155,7 +155,7 @@ def median_difference(
     """Median of `(n,)` minus median of `(m,)`, with a percentile bootstrap.
 
     Percentile, since a median moves in steps: BCa's jackknife fails on it. Covers 92 to
-    98 % from 5 runs on; of fewer there are no bounds.
+    99 % from 5 runs on; of fewer there are no bounds.
     """
     a, b = checked(a), checked(b)
     value = float(np.median(a) - np.median(b))

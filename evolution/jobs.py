@@ -10,13 +10,14 @@ import signal
 import threading
 import traceback
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from epuck_mj.errors import UserError
+from epuck_mj.interruption import deaf_to_interrupts
 from evolution.config import ExperimentConfig
 from evolution.execution import Means, Run
 from evolution.run_directory import RunDirectory
@@ -191,13 +192,3 @@ def _ending(process: BaseProcess) -> str | None:
     if status < 0:
         return f"its process was killed by {signal.Signals(-status).name}"
     return f"its process ended with status {status}" if status else None
-
-
-@contextmanager
-def deaf_to_interrupts() -> Iterator[None]:
-    """Processes started in the block ignore Ctrl-C: their parent ends them."""
-    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)

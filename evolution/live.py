@@ -18,13 +18,13 @@ import numpy as np
 
 from epuck_mj.command_line import command
 from epuck_mj.errors import UserError
+from epuck_mj.interruption import deaf_to_interrupts
 from epuck_mj.model import load_scene
 from epuck_mj.starts import FreeSpace
 from epuck_mj.trajectory import record
 from evolution.champion import starts_for_test
 from evolution.config import ExperimentConfig
 from evolution.experiment import Experiment, Record
-from evolution.jobs import deaf_to_interrupts
 
 HOST, PORT = "127.0.0.1", 9876
 """Where rerun's viewer listens."""

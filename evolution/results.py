@@ -95,7 +95,7 @@ def summary(controller: ControllerFile) -> str:
     ]
     if "held_out_as_evolved" in scores:
         disturbed = _held_out(scores["held_out_as_evolved"])
-        lines.insert(1, f"The same on robots as it evolved on: {disturbed}")
+        lines.insert(1, f"The same with the disturbances it evolved with: {disturbed}")
     return "\n".join(lines)
 
 

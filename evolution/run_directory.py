@@ -205,8 +205,8 @@ class RunDirectory:
         """Text of timing.csv; no seconds where a kill took them."""
         taken: dict[int, str] = {}
         if files.is_file(self.timing):
-            rows = csv.DictReader(self.timing.read_text(encoding="utf-8").splitlines())
-            for row in rows:
+            text = self.timing.read_text(encoding="utf-8", errors="replace")
+            for row in csv.DictReader(text.splitlines()):
                 # a row that was cut off says nothing
                 with suppress(KeyError, TypeError, ValueError):
                     taken[int(row["generation"])] = f"{float(row['seconds']):.3f}"

@@ -1,8 +1,8 @@
 """Samples of runs described: means, shares and quartiles with their bounds.
 
 The unit is the run: a sample is `(n,)`, one value per run, finite and not empty, or
-there is a `ValueError`. One run has a value but no spread: its bootstrap bounds are
-nan. The same generator gives the same bounds.
+there is a `ValueError`. One run has a value but no spread, and few have none that could
+be trusted: their bounds are nan. The same generator gives the same bounds.
 """
 
 import math

@@ -20,8 +20,9 @@ from epuck_mj.wall_follower import YARDSTICK, WallFollower
 from evolution.execution import Means
 from evolution.jobs import Event, Job, carry_out_side_by_side
 from evolution.results import judges, scores
+from evolution.run_directory import locked
 from evolution.study_config import StudyConfig, find_study, parse_seeds
-from evolution.study_directory import StudyDirectory
+from evolution.study_directory import PATIENCE, StudyDirectory
 
 MODULE = "evolution.study"
 JOBS_MAX = 1024
@@ -123,7 +124,8 @@ def _measure_yardstick(directory: StudyDirectory, config: StudyConfig) -> None:
         robot: asdict(judge.test(WallFollower()))
         for robot, judge in judges(world).items()
     }
-    with files.writing(directory.path):
+    # whoever opens the study removes what looks left over
+    with locked(directory.path, PATIENCE), files.writing(directory.path):
         text = json.dumps({"held_out": tests}, indent=1) + "\n"
         files.write_text(directory.yardstick, text)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, Field, FiniteFloat, ValidationError
+from pydantic import BaseModel, Field, FiniteFloat, StrictInt, ValidationError
 
 from epuck_mj import controller
 from epuck_mj.control import TaskParameters
@@ -111,14 +111,14 @@ def load_study(path: Path) -> StudyData:
         not_begun = set(asked.get(name, ())) - set(directory.seeds(name))
         if not_begun:
             seeds = seeds_text(sorted(not_begun))
-            missing.append(f"{name} seeds {seeds}: asked for, not begun")
-        if not finished:
+            missing.append(f"{name} seeds {seeds}: asked for, not there")
+        elif not finished:
             missing.append(f"{name}: no finished run")
     everything = [run for each in runs.values() for run in each]
     if not everything:
         said = "; ".join([*missing[:3], "..."] if len(missing) > 3 else missing)
         raise UserError(f"no finished run in '{path}': {said}")
-    missing += _unpaired(runs)
+    missing += _unpaired({n: each for n, each in runs.items() if n not in asked})
     robots = {tuple(run.champion.scores["held_out"]) for run in everything}
     steps = {run.champion.task["steps"] for run in everything}
     if len(robots) > 1 or len(steps) > 1:
@@ -169,7 +169,7 @@ class _Test(BaseModel):
     interval: tuple[float, float] | None = None
     worst: FiniteFloat | None = None
     crash_rate: FiniteFloat
-    starts: int = Field(gt=0)
+    starts: StrictInt = Field(gt=0)
     behaviour: dict[str, FiniteFloat] | None = None
     metrics: dict[str, FiniteFloat | None] | None = None
 

@@ -70,7 +70,8 @@ class StudyDirectory:
         if files.is_file(self.path):
             raise UserError(f"output '{self.path}' is not a directory")
         with files.writing(self.path):
-            if not files.is_file(self.config) and self._holds_anything():
+            # in this order: another process may write the study meanwhile
+            if self._holds_anything() and not files.is_file(self.config):
                 raise UserError(
                     f"output '{self.path}' is not empty and holds no study: expected "
                     "a new directory, or one with a study.yaml"
@@ -79,6 +80,10 @@ class StudyDirectory:
             with locked(self.path, PATIENCE):
                 files.remove_leftovers(self.path)
                 asked = self.asked_seeds()
+                if not asked and files.is_file(self.config):
+                    # an older study did not say
+                    begun = self.stored_config().experiments
+                    asked = {name: self.seeds(name) for name in begun}
                 for name in config.experiments:
                     asked[name] = sorted({*asked.get(name, ()), *seeds})
                 if files.is_file(self.config):
@@ -90,8 +95,10 @@ class StudyDirectory:
         """Whether more is there than what a killed writer left behind."""
         if not files.is_directory(self.path):
             return False
-        aside = {*files.leftovers(self.path), self.path / LOCK}
-        return bool(set(self.path.iterdir()) - aside)
+        return any(
+            path.name != LOCK and not files.is_leftover(path)
+            for path in self.path.iterdir()
+        )
 
     def stored_config(self) -> StudyConfig:
         """The study that is there.

@@ -103,9 +103,10 @@ def _differing(
     world = config.arena, config.task, config.start_clearance
     for kind in ("held_out", "held_out_as_evolved"):
         for robot, written in champion.scores.get(kind, {}).items():
-            n, met = written["starts"], None
+            n, met, where = written["starts"], None, robot
             if kind == "held_out_as_evolved":
                 met = held_out_disturbances(config, Purpose.TEST, n)
+                where = f"{robot} as evolved on"
             # its own robot may be a file
             named = config.robot if Path(config.robot).name == robot else robot
             test = judge(named, *world).test(champion.controller, n, met)
@@ -114,12 +115,12 @@ def _differing(
             if again["mean"] != written["mean"]:
                 low, high = test.interval
                 yield (
-                    f"{robot} {written['mean']!r} is now {test.mean!r} "
+                    f"{where} {written['mean']!r} is now {test.mean!r} "
                     f"({test.mean - written['mean']:+.3g}, 95 % CI {low:.1f} to "
                     f"{high:.1f})"
                 )
             elif others := [key for key in written if again.get(key) != written[key]]:
-                yield f"{robot}, the same mean, but other {', '.join(others)}"
+                yield f"{where}, the same mean, but other {', '.join(others)}"
 
 
 def _most_believed(
@@ -133,8 +134,11 @@ def _most_believed(
     if not written or not files.is_file(run.best_individuals):
         return
     best = files.read_arrays(run.best_individuals)
-    generation = best["fitness"].argmax()
-    policy = config.network.decode(best["genomes"][generation])
+    try:
+        genome = best["genomes"][best["fitness"].argmax()]
+        policy = config.network.decode(genome)
+    except (KeyError, ValueError, IndexError) as error:
+        raise UserError(f"'{run.best_individuals}' is damaged: {error}") from None
     world = config.robot, config.arena, config.task, config.start_clearance
     mean = judge(*world).test(policy).mean
     if mean != written["held_out"]:

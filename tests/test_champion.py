@@ -299,7 +299,7 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
     assert found["epuck"] == asdict(test)
     assert found["epuck"]["mean"] != stored.scores["held_out"]["epuck"]["mean"]
     _, disturbed, _ = summary(stored).splitlines()
-    assert disturbed.startswith("The same on robots as it evolved on: epuck_planar ")
+    assert disturbed.startswith("The same with the disturbances it evolved with: ")
 
 
 def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):

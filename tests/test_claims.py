@@ -15,15 +15,16 @@ from evolution.report.claims import (
     held_out_order,
     maturity,
     mean_to_best,
+    tally,
     unlike,
-    verdicts,
 )
 from evolution.report.first_generation import FirstGeneration, first_generation
-from evolution.report.pairs import pairs_of
+from evolution.report.pairs import pair_rows, pairs_of
 from evolution.report.reproduction import reproduction
 from evolution.report.verdicts import (
     CONSISTENT,
     INCONSISTENT,
+    NOT_MEASURED,
     OTHER_STUDY,
     TOO_FEW,
     UNDECIDED,
@@ -263,7 +264,7 @@ def test_runs_without_behaviour_leave_it_open():
     data = study(LIKE_THE_PAPER)
     for each in data.runs["ga"]:
         each.champion.scores["held_out"]["epuck"]["behaviour"] = None
-    assert verdict(claims(data), "GA", "without crashing") == TOO_FEW
+    assert verdict(claims(data), "GA", "without crashing") == NOT_MEASURED
 
 
 def test_the_held_out_order_is_another_one():
@@ -276,8 +277,31 @@ def test_the_held_out_order_is_another_one():
         assert verdict(found, "DE/best", "exceeds", "GA") == INCONSISTENT
 
 
+def test_held_out_orders_are_decided_as_in_the_report():
+    """There the baselines count among the pairs, and raise what p has to be below."""
+    shifts = {"de-best": 4.5, "de-rand": 2.2, "ga": 0.0}
+    runs = {
+        name: tuple(run(i, 200, 1, 200 + shift + i) for i in range(10))
+        for name, shift in shifts.items()
+    }
+    alone = held_out_order(study({}, runs=runs), "epuck")
+    assert verdict(alone, "DE/best", "exceeds", "GA") == CONSISTENT
+    baselines = ("cma-es", "one-plus-one-es", "random-search")
+    configs = {name: load_config(find_config(name)) for name in (*NAMES, *baselines)}
+    runs |= dict.fromkeys(baselines, runs["ga"])
+    together = study({}, runs=runs, configs=configs)
+    found = held_out_order(together, "epuck")
+    assert verdict(found, "DE/best", "exceeds", "GA") == UNDECIDED
+    (row,) = [
+        row
+        for row in pair_rows(together)
+        if (row.measure, row.a, row.b) == ("held-out epuck", "de-best", "ga")
+    ]
+    assert row.family == 15 and not row.decided
+
+
 def test_verdicts_are_counted():
-    counts = verdicts(claims(study(LIKE_THE_PAPER)))
+    counts = tally(claims(study(LIKE_THE_PAPER)))
     assert sum(counts.values()) == len(claims(study(LIKE_THE_PAPER)))
 
 

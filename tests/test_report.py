@@ -30,6 +30,7 @@ from evolution.report.blocks import (
     to_markdown,
 )
 from evolution.report.command import report, tables
+from evolution.report.findings import held_out_fitness
 from evolution.report.pairs import compared, pair_rows
 from evolution.report.samples import TARGET_SHARES, rank_correlation
 from evolution.report.successes import BEATS, FOLLOWS, success_rows
@@ -38,7 +39,7 @@ from evolution.report.tables import csv_text, run_rows, target_rows
 from evolution.report.words import spread
 from evolution.study_config import seeds_text
 from evolution.study_data import load_study
-from tests.study_on_disk import LEVELS, history, write_study
+from tests.study_on_disk import LEVELS, ROBOTS, history, write_study
 
 NAMES = tuple(LEVELS)
 N_OF = (1, 2, 3, 12)
@@ -149,6 +150,21 @@ def test_pairs_by_hand(study):
             assert math.isnan(float(row["median_difference_low"]))
         else:
             assert low <= wins <= high
+
+
+def test_disturbed_champions_are_shown_with_their_disturbances(tmp_path):
+    path = write_study(tmp_path / "study", seeds(2))
+    assert "disturbances" not in to_markdown(held_out_fitness(load_study(path)))
+    for seed in (1, 2):
+        champion = path / "ga" / f"seed-{seed}" / "champion.json"
+        fields = json.loads(champion.read_text())
+        test = fields["scores"]["held_out"]["epuck"]
+        disturbed = {robot: test | {"mean": 40.0 + seed} for robot in ROBOTS}
+        fields["scores"]["held_out_as_evolved"] = disturbed
+        champion.write_text(json.dumps(fields))
+    text = to_markdown(held_out_fitness(load_study(path)))
+    assert "with the disturbances that they evolved with" in text
+    assert "| GA | 2 | 41.5 [41.2, 41.8] |" in text
 
 
 def test_no_stars_below_ten_runs(study):

@@ -157,7 +157,10 @@ def test_fitness_shows_medians_bands_and_every_run(data, name):
     # best and mean, each run's, and the yardstick's
     assert len(axes.lines) == 2 + (2 * n if n > 1 else 0) + 1
     np.testing.assert_array_equal(axes.lines[-1].get_ydata(), [200, 200])
-    assert "Dashed: held-out fitness of the hand-written wall follower" in caption
+    assert (
+        "Black and dashed: held-out fitness of the hand-written wall follower"
+        in caption
+    )
     assert len(bands) == (2 if n > 1 else 0)
     assert axes.get_ylabel() == "stored fitness (max 300)"
     assert f"{label(name)} (n = {n})" in legend_texts(figure)

@@ -38,7 +38,7 @@ def test_one_command_runs_reports_and_judges_and_goes_on(here, capfd):
     assert "python -m evolution.reproduce --quick --output out" in first
     # it is another study than the paper's, and says so
     assert first.count(OTHER_STUDY) > 16
-    assert "evaluations (stored 30000, got 20)" in first
+    assert "evaluations 20 (shipped 30000)" in first
     assert "Missing: no such study was given." in first
     for name in ("report.md", "report.html", "summary.json", "pairwise.csv"):
         assert (here / "out" / "report-tiny" / name).is_file()

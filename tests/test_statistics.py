@@ -92,6 +92,7 @@ def test_holm_raises_p_values_and_keeps_their_order(p):
     assert adjusted.min() == min(1, p.size * p.min())
 
 
+@pytest.mark.slow
 def test_holm_keeps_the_family_wise_error():
     """Three algorithms that do not differ, each against each: at most 5 % err."""
     # values, then pairs, of 4,000 studies with 20 runs each

@@ -33,6 +33,7 @@ DAMAGE: dict[str, Callable[[dict], object]] = {
     "interval of three": lambda f: f["scores"]["held_out"]["epuck"].update(
         interval=[1, 2, 3]
     ),
+    "starts a text": lambda f: f["scores"]["held_out"]["epuck"].update(starts="9"),
     "no starts": lambda f: f["scores"]["held_out"]["epuck"].pop("starts"),
     "most_believed empty": lambda f: f["scores"].update(most_believed={}),
     "task empty": lambda f: f.update(task={}),
@@ -78,7 +79,7 @@ def test_seeds_that_were_asked_for_are_missed(path):
     (path / "seeds.yaml").write_text("de-best: 1-30\nga: 1-3\nde-rand: '4'\n")
     (path / "ga" / "seed-3").mkdir()
     assert load_study(path).missing == (
-        "de-best seeds 3-30: asked for, not begun",
+        "de-best seeds 3-30: asked for, not there",
         "ga seed 3: not finished",
     )
 

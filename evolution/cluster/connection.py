@@ -22,7 +22,7 @@ from distributed import (
 from distributed.comm.core import connect
 
 from epuck_mj.errors import UserError
-from evolution.jobs import deaf_to_interrupts
+from epuck_mj.interruption import deaf_to_interrupts
 
 REMOTE = re.compile(r"(tcp|tls)://[^\s/]+:\d{1,5}")
 LOCAL = re.compile(r"local:([1-9]\d{0,2})")

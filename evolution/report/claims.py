@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evolution.config import differing_keys
+from evolution.config import flat
 from evolution.held_out import WHEELED_ROBOT
-from evolution.report.pairs import numbers, pairs_of
+from evolution.report.pairs import PairRow, numbers, pair_rows, pairs_of
 from evolution.report.samples import FOLLOWING, following_share
+from evolution.report.tables import held_out_measure
 from evolution.report.verdicts import (
+    NOT_MEASURED,
     OTHER_STUDY,
     TOO_FEW,
     of_best,
@@ -63,11 +65,11 @@ def claims(study: StudyData) -> list[Claim]:
     shares = _samples(study, lambda name: 100 * mean_to_best(study, name))
     early = _samples(study, lambda name: 100 * maturity(study, name))
     found = [
-        *_orders(stored, "in best (stored) fitness"),
+        *_orders(_pairs(stored), stored, "in best (stored) fitness"),
         *(_maximum(stored, name) for name in PAPER_BEST),
         *(_approaches(shares, name) for name in ("de-best", "de-rand")),
         _stays_apart(shares),
-        *_orders(shares, "in the mean's share of the best")[1:],
+        *_orders(_pairs(shares), shares, "in the mean's share of the best [%]")[1:],
         *(_mature_early(early, name) for name in ("de-best", "de-rand")),
         *(_follows(study, name) for name in PAPERS),
     ]
@@ -75,9 +77,15 @@ def claims(study: StudyData) -> list[Claim]:
 
 
 def held_out_order(study: StudyData, robot: str) -> list[Claim]:
-    """The paper's order in what the paper did not measure: held-out fitness."""
+    """The paper's order in what the paper did not measure, as the report decides it.
+
+    There p values are adjusted for all pairs of the study, baselines included.
+    """
     held_out = _samples(study, lambda name: study.held_out(name, robot))
-    return _of_the_paper(study, _orders(held_out, f"in held-out fitness on {robot}"))
+    measure = held_out_measure(robot)
+    rows = [row for row in pair_rows(study) if row.measure == measure]
+    found = _orders(rows, held_out, f"in held-out fitness on {robot}")
+    return _of_the_paper(study, found)
 
 
 def unlike(study: StudyData) -> list[str]:
@@ -85,12 +93,16 @@ def unlike(study: StudyData) -> list[str]:
     shipped = StudyConfig.load(find_study(PAPER)).experiments
     lines = []
     for name in PAPERS:
-        if name in study.configs:
-            config = study.configs[name]
-            free = {"seed": config.seed, "robot": config.robot}
-            theirs = shipped[name].model_copy(update=free)
-            if differing := differing_keys(theirs, config):
-                lines.append(f"{name}: {', '.join(differing)}")
+        if name not in study.configs:
+            continue
+        theirs, ours = flat(shipped[name]), flat(study.configs[name])
+        differing = [
+            f"{key} {ours.get(key)} (shipped {theirs.get(key)})"
+            for key in dict.fromkeys([*theirs, *ours])
+            if key not in ("seed", "robot") and theirs.get(key) != ours.get(key)
+        ]
+        if differing:
+            lines.append(f"{name}: {', '.join(differing)}")
     return lines
 
 
@@ -116,7 +128,7 @@ def maturity(study: StudyData, name: str) -> np.ndarray:
     return np.array(shares)
 
 
-def verdicts(found: Sequence[Claim]) -> dict[str, int]:
+def tally(found: Sequence[Claim]) -> dict[str, int]:
     """How many claims came out which way, the most frequent way first."""
     return dict(Counter(claim.verdict for claim in found).most_common())
 
@@ -137,16 +149,22 @@ def _of_the_paper(study: StudyData, found: Sequence[Claim]) -> list[Claim]:
     return [Claim(each.text, "-", each.n, OTHER_STUDY) for each in found]
 
 
-def _orders(samples: dict[str, np.ndarray], where: str) -> list[Claim]:
-    """DE/best before DE/rand, DE/best before the GA, DE/rand before the GA."""
+def _pairs(samples: dict[str, np.ndarray]) -> list[PairRow]:
+    """All pairs of the paper's algorithms that have runs."""
     filled = {name: sample for name, sample in samples.items() if sample.size}
-    rows = {(row.a, row.b): row for row in pairs_of(where, filled)}
-    found = []
+    return pairs_of("", filled)
+
+
+def _orders(
+    rows: Sequence[PairRow], samples: dict[str, np.ndarray], where: str
+) -> list[Claim]:
+    """DE/best before DE/rand, DE/best before the GA, DE/rand before the GA."""
+    by_pair, found = {(row.a, row.b): row for row in rows}, []
     for pair in (("de-best", "de-rand"), ("de-best", "ga"), ("de-rand", "ga")):
         better, worse = pair
         text = f"{label(better)} exceeds {label(worse)} {where}"
         n = f"{samples[better].size} and {samples[worse].size}"
-        row = rows.get(pair)
+        row = by_pair.get(pair)
         if row is None:
             found.append(Claim(text, "-", n, TOO_FEW))
         else:
@@ -209,12 +227,12 @@ def _claim(
 
     Args:
         text: what the paper says.
-        sample: of our runs, `(n,)`, in percent if it has a quantity; may be empty.
+        sample: of the runs that say, `(n,)`, in percent if it has a quantity.
         judged: what we found and the verdict, if there are runs.
         quantity: what the sample is.
     """
     if not sample.size:
-        return Claim(text, "-", "0", TOO_FEW)
+        return Claim(text, "-", "0", NOT_MEASURED)
     ours, verdict = judged()
     if quantity:
         ours = f"{quantity}: {median_and_quartiles(sample, ' %')}; so in {ours}"

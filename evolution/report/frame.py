@@ -25,7 +25,7 @@ def what_was_run(data: StudyData) -> list[Block]:
         for robot in data.robots
         for test in tests_of(data, name, robot)
     }
-    n_starts = " or ".join(f"{n:,}" for n in sorted(starts)) or "the"
+    n_starts = " or ".join(f"{n:,}" for n in sorted(starts))
     blocks: list[Block] = [
         Heading(f"Report of the study {data.path.as_posix()}", 1),
         Paragraph(
@@ -38,14 +38,13 @@ def what_was_run(data: StudyData) -> list[Block]:
     if data.missing:
         blocks.append(Listing(data.missing))
     else:
-        blocks.append(Paragraph("Nothing: all runs that were asked for are finished."))
+        blocks.append(Paragraph("Nothing: all runs that were begun are finished."))
     if sizes[0] < 2:
         few = [label(name) for name, each in runs.items() if len(each) < 2]
         blocks.append(
             Paragraph(
                 f"Only one run of {', '.join(few)}: one run has a value but says "
-                "nothing of the spread between runs, so there is no interval "
-                "and no verdict."
+                "nothing of the spread between runs, so there is no verdict."
             )
         )
     blocks += [
@@ -54,7 +53,7 @@ def what_was_run(data: StudyData) -> list[Block]:
             f"{sum(len(each) for each in runs.values())} finished runs of "
             f"{len(runs)} experiments. Evolved on the {robot_name(data.robots[0])}. "
             f"Each run's champion is tested on {n_starts} test starts, the same for "
-            "all and never seen by evolution, on the "
+            "all and never seen by evolution, with ideal sensors and motors, on the "
             f"{' and the '.join(map(robot_name, shown_robots(data)))}. The unit is "
             f"the run; fitness is at most {data.steps}, the control steps of a trial."
         ),
@@ -93,7 +92,7 @@ def what_was_run(data: StudyData) -> list[Block]:
             "Budget and spent are individual evaluations, each of that many trials; a "
             "run spends whole generations only. Control steps of a run are in "
             f"millions, median [quartiles]; {data.steps} a trial at most, fewer for "
-            "robots that crash, and for those of DE that can only lose."
+            "robots that crash, and where racing breaks off who can only lose."
         ),
     ]
     return blocks

@@ -17,8 +17,8 @@ from evolution.report.claims import (
     Claim,
     claims,
     held_out_order,
+    tally,
     unlike,
-    verdicts,
 )
 from evolution.report.first_generation import FirstGeneration
 from evolution.report.samples import kept, most_believed
@@ -95,7 +95,7 @@ def reproduction(
         made_by: the command that wrote it.
     """
     found = claims(study)
-    counts = "; ".join(f"{n} {verdict}" for verdict, n in verdicts(found).items())
+    counts = "; ".join(f"{n} {verdict}" for verdict, n in tally(found).items())
     blocks: list[Block] = [
         Heading("Reproduction", 1),
         Paragraph(
@@ -106,11 +106,12 @@ def reproduction(
         Code([made_by]),
         Paragraph(
             "n counts runs; below 10 there is no verdict. An order is decided by a "
-            "Mann-Whitney p below 0.05, Holm-adjusted for the three orders of its "
-            "kind (difference of medians and A12 with 95 % bounds); a statement about "
-            "runs by Wilson's 95 % bounds on one side of one half; a maximum of the "
-            "paper, taken for the best of three runs, by the probability that the "
-            "best of three more of ours has as rare a place among ours."
+            "Mann-Whitney p below 0.05, Holm-adjusted for the three pairs of the "
+            "paper's algorithms (difference of medians and A12 with 95 % bounds); "
+            "a statement about runs by Wilson's 95 % bounds on one side of one half. "
+            "A maximum of the paper, taken for the best of three runs, is inconsistent "
+            "if the best of three of our own would have so extreme a rank among ours "
+            "with p < 0.05, two-sided; above all of ours it stays undecided."
         ),
         Heading("What there is"),
         *_there(study),
@@ -127,7 +128,8 @@ def reproduction(
         Heading("The same order by fresh starts"),
         Paragraph(
             "What the paper could not see: champions on 1,000 starts that evolution "
-            "never met. The decisions are those of the report."
+            "never met. Decided as in the report: adjusted for all pairs of the study, "
+            "baselines included."
         ),
         *(_claims(held_out_order(study, robot)) for robot in shown_robots(study)),
         Heading("What stored fitness hides"),
@@ -230,7 +232,7 @@ def _hidden(study: StudyData) -> list[Block]:
 def _rungs(study: StudyData) -> list[Block]:
     """How much of the planar fitness champions keep on wheels."""
     if len(study.robots) < 2:
-        return [Paragraph("Both rungs are the same robot here.")]
+        return [Paragraph("Champions were tested on one robot only.")]
     first, last = study.robots[0], study.robots[-1]
     shares = {
         name: kept(study.held_out(name, last), study.held_out(name, first))

@@ -26,7 +26,7 @@ def tests_of(data: StudyData, name: str, robot: str) -> list[Mapping[str, Any]]:
     return [run.champion.scores["held_out"][robot] for run in data.runs[name]]
 
 
-def known(tests: list[Mapping[str, Any]], key: str) -> np.ndarray:
+def known(tests: Sequence[Mapping[str, Any]], key: str) -> np.ndarray:
     """A value of each held-out evaluation that has it, `(n,)`."""
     values = [test.get(key) for test in tests]
     return np.array([value for value in values if value is not None], float)
@@ -43,7 +43,7 @@ def clearance(test: Mapping[str, Any]) -> float | None:
     return _metric(test, "clearance_mean")
 
 
-def success_share(test: Mapping[str, Any]) -> float | None:
+def whole_lap_share(test: Mapping[str, Any]) -> float | None:
     """Share of its trials with a whole lap, likewise."""
     return _metric(test, "success")
 
@@ -58,9 +58,9 @@ def clearances(data: StudyData, name: str, robot: str) -> np.ndarray:
     return np.array([value for value in values if value is not None], float)
 
 
-def successes(data: StudyData, name: str, robot: str) -> np.ndarray:
+def whole_laps(data: StudyData, name: str, robot: str) -> np.ndarray:
     """Share of each champion's trials with a whole lap, `(n,)`."""
-    values = [success_share(test) for test in tests_of(data, name, robot)]
+    values = [whole_lap_share(test) for test in tests_of(data, name, robot)]
     return np.array([value for value in values if value is not None], float)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from evolution.comparisons import fisher, holm
+from evolution.comparisons import FEWEST_FOR_STARS, LEVELS, fisher, holm
 from evolution.report.samples import FOLLOWING, following_share
 from evolution.report.tables import shown_robots
 from evolution.statistics import wilson
@@ -63,6 +63,14 @@ class SuccessRow:
     fisher_p: float | None = None
     fisher_p_holm: float | None = None
     family: int | None = None
+
+    @property
+    def decided(self) -> bool:
+        """Whether there are runs enough, and they say that the two differ."""
+        if self.fisher_p_holm is None or self.other_n is None:
+            return False
+        enough = min(self.n, self.other_n) >= FEWEST_FOR_STARS
+        return enough and self.fisher_p_holm < LEVELS[0]
 
 
 def success_rows(data: StudyData) -> list[SuccessRow]:

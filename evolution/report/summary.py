@@ -60,7 +60,7 @@ def commands(data: StudyData, output: str, ioh: bool) -> dict[str, str]:
         "held-out fitness and behaviour of every champion": command_line(
             "evolution.evaluate", study
         ),
-        "whether they and the most believed score the same here": command_line(
+        "whether every champion scores the same on this machine": command_line(
             "evolution.verify", study
         ),
         "the hand-written wall follower": command_line("evolution.evaluate", YARDSTICK),

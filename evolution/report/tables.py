@@ -17,7 +17,7 @@ from evolution.report.samples import (
     clearance,
     following_share,
     hits,
-    success_share,
+    whole_lap_share,
 )
 from evolution.run_directory import RunDirectory
 from evolution.study_data import RunData, StudyData
@@ -84,7 +84,7 @@ def _run_row(data: StudyData, name: str, run: RunData) -> dict[str, Any]:
             "collisions_per_minute": test.get("collisions_per_minute"),
             "following": following_share(test) if test.get("behaviour") else None,
             "clearance_mean": clearance(test),
-            "success": success_share(test),
+            "whole_lap": whole_lap_share(test),
             "starts": test.get("starts"),
         }
         row |= {f"{robot} {column}": value for column, value in columns.items()}
@@ -103,7 +103,7 @@ def control_steps(run: RunData) -> int | None:
     try:
         with RunDirectory(run.path).timing.open(encoding="utf-8", newline="") as file:
             rows = csv.DictReader(file)
-            # a generation that was done twice counts once
+            # in older files a generation that was done twice stands twice
             steps = {row["generation"]: int(row["control_steps"]) for row in rows}
     except (OSError, ValueError, KeyError, TypeError):
         return None

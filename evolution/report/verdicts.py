@@ -1,9 +1,9 @@
 """Verdicts on claims: what runs have to show before they speak for or against one.
 
 As in the report, fewer than 10 runs of an algorithm give none. An order needs
-a Mann-Whitney p below 0.05, adjusted for the orders of its kind; a statement about
+a Mann-Whitney p below 0.05, adjusted for the pairs of its kind; a statement about
 every run a Wilson interval on one side of one half; the best of a few runs of somebody
-else has to have a place among ours that is not too rare.
+else has to have a rank among ours that is not too extreme.
 """
 
 from math import comb
@@ -18,6 +18,7 @@ from evolution.statistics import wilson
 CONSISTENT, INCONSISTENT = "consistent", "inconsistent"
 UNDECIDED = "can't be tested: undecided by these runs"
 TOO_FEW = f"can't be tested: fewer than {FEWEST_FOR_STARS} runs"
+NOT_MEASURED = "can't be tested: not measured"
 OTHER_STUDY = "can't be tested: another study"
 
 
@@ -55,7 +56,8 @@ def of_best(sample: np.ndarray, best: float, replicates: int) -> tuple[str, str]
     above, p = int((sample > best).sum()), chance_of_best(sample, best, replicates)
     ours = (
         f"runs from {sample.min():.1f} to {sample.max():.1f}, {above} of {sample.size} "
-        f"above; p {probability(p)} for the best of {replicates} such runs"
+        f"above; the best of {replicates} runs like these has so extreme a rank with "
+        f"p {probability(p)}"
     )
     if sample.size < FEWEST_FOR_STARS:
         return ours, TOO_FEW
@@ -65,7 +67,7 @@ def of_best(sample: np.ndarray, best: float, replicates: int) -> tuple[str, str]
 
 
 def chance_of_best(sample: np.ndarray, best: float, replicates: int) -> float:
-    """Probability, two-sided, that the best of more runs has a rank as rare among ours.
+    """Probability, two-sided, that the best of more runs is as extreme among ours.
 
     If all runs are alike, theirs and ours are in any order with the same probability.
     """

@@ -97,8 +97,7 @@ def held_out(data: StudyData) -> tuple[Figure, str]:
         f"(tick) and the interquartile range (bar). {CHAMPION}"
     )
     if YARDSTICK_LABEL in lines:
-        robot = robot_name(data.robots[0])
-        caption += f" Dashed: the {YARDSTICK_LABEL}, held-out on the {robot}."
+        caption += f" Dashed: the {YARDSTICK_LABEL} on the same starts and robot."
     return figure, caption
 
 

@@ -175,7 +175,7 @@ def _draw_yardstick(axes: Axes, data: StudyData, lines: dict[str, Line2D]) -> st
         return ""
     lines[YARDSTICK_SHORT] = axes.axhline(reference, **YARDSTICK_LOOK)
     return (
-        f" Dashed: held-out fitness of the {YARDSTICK_LABEL} on the "
+        f" Black and dashed: held-out fitness of the {YARDSTICK_LABEL} on the "
         f"{robot_name(robot)}, which has no stored fitness."
     )
 
