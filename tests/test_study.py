@@ -233,7 +233,8 @@ def test_every_run_is_the_same_as_alone(here, monkeypatch):
         }
     assert not [path for path in out.rglob(".*") if path.name != LOCK]
     names = {path.name for path in out.iterdir()}
-    assert names == {"one", "two", "study.yaml", "wall-follower.json"}
+    files = {".lock", "seeds.yaml", "study.yaml", "wall-follower.json"}
+    assert names == {"one", "two"} | files
     # a line for every run
     *lines, summary, report = process.stdout.splitlines()
     pattern = r"(\d)/4 (\w+) seed (\d): held-out .* crash\); stored \d+\.\d"
