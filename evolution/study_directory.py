@@ -83,7 +83,7 @@ class StudyDirectory:
                 if not asked and files.is_file(self.config):
                     # an older study did not say
                     begun = self.stored_config().experiments
-                    asked = {name: self.seeds(name) for name in begun}
+                    asked = {n: there for n in begun if (there := self.seeds(n))}
                 for name in config.experiments:
                     asked[name] = sorted({*asked.get(name, ()), *seeds})
                 if files.is_file(self.config):

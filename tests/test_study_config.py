@@ -284,6 +284,15 @@ def test_two_that_open_a_study_at_once_both_have_their_say(here):
     assert directory.asked_seeds() == {"ga": [1], "de-best": [2]}
 
 
+def test_an_older_study_was_asked_for_what_it_has(here):
+    directory = StudyDirectory(here / "out")
+    directory.open(study("experiments: [ga, de-best]"), [1])
+    directory.asked.unlink()
+    (directory.path / "ga" / "seed-4").mkdir(parents=True)
+    directory.open(study("experiments: [ga]"), [7])
+    assert directory.asked_seeds() == {"ga": [4, 7]}
+
+
 @pytest.mark.parametrize("content", ["ga: 1-x", "[ga]", "ga: {1: 2}"])
 def test_damaged_seeds_are_refused(content, here):
     directory = StudyDirectory(here)
