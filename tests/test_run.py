@@ -769,7 +769,7 @@ def test_resume_from_between_any_two_writes(here, quick, monkeypatch):
     assert [name for name, _ in moments] == [
         "config.yaml",
         "provenance.json",
-        *["checkpoint.npz", "history.csv", "best_individuals.npz"] * 2,
+        *["checkpoint.npz", "history.csv", "best_individuals.npz", "timing.csv"] * 2,
         "champion.json",
         "provenance.json",
     ]
@@ -789,7 +789,7 @@ def test_a_full_disk_leaves_what_was_there(
     def full(handle: int) -> None:
         calls.append(handle)
         # config, provenance, checkpoint and what follows, and then another checkpoint
-        if len(calls) == 6:
+        if len(calls) == 7:
             raise OSError(errno.ENOSPC, "No space left on device")
         sync(handle)
 
