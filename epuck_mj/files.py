@@ -2,7 +2,7 @@
 
 import io
 import os
-import tempfile
+import secrets
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -19,17 +19,16 @@ TEMPORARY = ".tmp"
 
 def write_bytes(path: Path, content: bytes) -> None:
     """Replace `path` by `content`; whoever reads sees the old file or the new."""
-    handle, temporary = _temporary(path)
+    # named before it is there: whenever a signal comes, it is known what to remove
+    temporary = _temporary(path)
     try:
-        with os.fdopen(handle, "wb") as file:
+        with temporary.open("xb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        # mkstemp makes files private; these are meant to be shared
-        Path(temporary).chmod(0o666 & ~_umask())
-        Path(temporary).replace(path)
+        temporary.replace(path)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         raise
 
 
@@ -85,12 +84,12 @@ def check_writable(path: Path) -> None:
         raise UserError(f"cannot write '{path}': it is a folder")
     if not is_directory(path.parent):
         raise UserError(f"cannot write '{path}': no folder '{path.parent}'")
+    probe = _temporary(path)
     try:
-        handle, probe = _temporary(path)
+        probe.touch(exist_ok=False)
+        probe.unlink()
     except OSError as error:
         raise UserError(f"cannot write '{path}': {error.strerror}") from None
-    os.close(handle)
-    Path(probe).unlink()
 
 
 def leftovers(folder: Path) -> list[Path]:
@@ -143,13 +142,6 @@ DAMAGED = (
 """What numpy and zipfile raise for damaged archives."""
 
 
-def _temporary(path: Path) -> tuple[int, str]:
-    """A new file beside `path`, open and by name."""
-    return tempfile.mkstemp(TEMPORARY, f".{path.name}-", path.parent)
-
-
-def _umask() -> int:
-    """The process's umask, which can only be read by setting it."""
-    umask = os.umask(0)
-    os.umask(umask)
-    return umask
+def _temporary(path: Path) -> Path:
+    """The name of a new file beside `path`."""
+    return path.with_name(f".{path.name}-{secrets.token_hex(4)}{TEMPORARY}")
