@@ -120,7 +120,7 @@ def rungs(data: StudyData) -> tuple[Figure, str] | None:
         )
     x, y = data.yardstick_mean(first), data.yardstick_mean(last)
     if x is not None and y is not None:
-        axes.plot(x, y, "+", color="black", ms=9, mew=1.2, zorder=2)
+        axes.plot(x, y, "+", color="black", ms=9, mew=1, zorder=4)
         lines[YARDSTICK_LABEL] = Line2D([], [], color="black", ls="", marker="+", ms=7)
     axes.set(
         xlim=(0, data.steps),
