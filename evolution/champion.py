@@ -11,7 +11,7 @@ import numpy as np
 
 from epuck_mj.disturbances import Disturbances
 from epuck_mj.starts import FreeSpace
-from evolution.config import ExperimentConfig
+from evolution.conditions import Conditions
 from evolution.evaluation import Engine, evaluate
 from evolution.experiment import Experiment, Purpose, disturbances, random_generator
 
@@ -40,10 +40,9 @@ def starts_for_test(space: FreeSpace, n: int = N_TEST) -> np.ndarray:
 
 
 def held_out_disturbances(
-    config: ExperimentConfig, purpose: Purpose, n: int
+    conditions: Conditions, purpose: Purpose, n: int, steps: int
 ) -> Disturbances | None:
-    """What champions of an experiment meet in `n` trials; of fewer, something else."""
-    conditions, steps = config.conditions, config.steps
+    """What champions meet in `n` trials of `steps`; in fewer, something else."""
     return disturbances(conditions, n, steps, HELD_OUT_SEED, purpose)
 
 
@@ -97,7 +96,10 @@ def choose_champion(engine: Engine, experiment: Experiment) -> Champion:
     starts = starts_for_validation(experiment.space)
     network = experiment.config.network
     # as it was evolved: robots that are disturbed alike
-    met = held_out_disturbances(experiment.config, Purpose.VALIDATION, len(starts))
+    config = experiment.config
+    met = held_out_disturbances(
+        config.conditions, Purpose.VALIDATION, len(starts), config.steps
+    )
     fitness = evaluate(engine, network, genomes, starts, disturbances=met).fitness
     best = int(fitness.argmax())
     return Champion(genomes[best], float(stored[best]), float(fitness[best]))

@@ -14,10 +14,10 @@ from epuck_mj.command_line import check_threads, main, parse
 from epuck_mj.disturbances import Disturbances
 from epuck_mj.errors import UserError
 from epuck_mj.wall_follower import YARDSTICK
-from evolution.champion import HELD_OUT_SEED, N_TEST
+from evolution.champion import N_TEST, held_out_disturbances
 from evolution.conditions import Conditions
 from evolution.config import NoiseLevel
-from evolution.experiment import Purpose, disturbances
+from evolution.experiment import Purpose
 from evolution.held_out import HeldOut, judging, tested_on
 from evolution.named_policies import named_policies
 
@@ -84,8 +84,7 @@ def evaluate(argv: Sequence[str]) -> int:
 
     @cache
     def met(steps: int) -> Disturbances | None:
-        key = (HELD_OUT_SEED, Purpose.TEST)
-        return disturbances(conditions, options.starts, steps, *key)
+        return held_out_disturbances(conditions, Purpose.TEST, options.starts, steps)
 
     tests = []
     for candidate in candidates:

@@ -65,7 +65,7 @@ def write_results(
     )
     policy = config.network.decode(champion.genome)
     tests = {robot: judge.test(policy) for robot, judge in judges.items()}
-    met = held_out_disturbances(config, Purpose.TEST, N_TEST)
+    met = held_out_disturbances(config.conditions, Purpose.TEST, N_TEST, config.steps)
     as_evolved = {
         robot: judge.test(policy, N_TEST, met)
         for robot, judge in judges.items()

@@ -105,7 +105,9 @@ def _differing(
         for robot, written in champion.scores.get(kind, {}).items():
             n, met, where = written["starts"], None, robot
             if kind == "held_out_as_evolved":
-                met = held_out_disturbances(config, Purpose.TEST, n)
+                met = held_out_disturbances(
+                    config.conditions, Purpose.TEST, n, config.steps
+                )
                 where = f"{robot} as evolved on"
             # its own robot may be a file
             named = config.robot if Path(config.robot).name == robot else robot

@@ -293,7 +293,7 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
     found = stored.scores["held_out_as_evolved"]
     assert list(found) == list(stored.scores["held_out"]) == ["epuck_planar", "epuck"]
     # the first of those that anybody draws
-    met = held_out_disturbances(config, Purpose.TEST, N_TEST)
+    met = held_out_disturbances(config.conditions, Purpose.TEST, N_TEST, config.steps)
     assert met is not None
     test = judges(config)["epuck"].test(stored.controller, 30, met)
     assert found["epuck"] == asdict(test)

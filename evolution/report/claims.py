@@ -8,9 +8,9 @@ import numpy as np
 
 from evolution.config import flat
 from evolution.held_out import WHEELED_ROBOT
-from evolution.report.pairs import PairRow, numbers, pair_rows, pairs_of
+from evolution.report.pairs import PairRow, numbers, pairs_of
 from evolution.report.samples import FOLLOWING, following_share
-from evolution.report.tables import held_out_measure
+from evolution.report.tables import held_out_measure, measures
 from evolution.report.verdicts import (
     NOT_MEASURED,
     OTHER_STUDY,
@@ -83,7 +83,7 @@ def held_out_order(study: StudyData, robot: str) -> list[Claim]:
     """
     held_out = _samples(study, lambda name: study.held_out(name, robot))
     measure = held_out_measure(robot)
-    rows = [row for row in pair_rows(study) if row.measure == measure]
+    rows = pairs_of(measure, measures(study)[measure])
     found = _orders(rows, held_out, f"in held-out fitness on {robot}")
     return _of_the_paper(study, found)
 

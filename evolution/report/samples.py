@@ -1,6 +1,6 @@
 """Samples of a report: what an experiment's champions show, one value per run."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -54,13 +54,21 @@ def _metric(test: Mapping[str, Any], name: str) -> float | None:
 
 def clearances(data: StudyData, name: str, robot: str) -> np.ndarray:
     """Mean clearance of each champion that was near a wall [m], `(n,)`."""
-    values = [clearance(test) for test in tests_of(data, name, robot)]
-    return np.array([value for value in values if value is not None], float)
+    return _metrics(data, name, robot, clearance)
 
 
 def whole_laps(data: StudyData, name: str, robot: str) -> np.ndarray:
     """Share of each champion's trials with a whole lap, `(n,)`."""
-    values = [whole_lap_share(test) for test in tests_of(data, name, robot)]
+    return _metrics(data, name, robot, whole_lap_share)
+
+
+def _metrics(
+    data: StudyData,
+    name: str,
+    robot: str,
+    metric: Callable[[Mapping[str, Any]], float | None],
+) -> np.ndarray:
+    values = [metric(test) for test in tests_of(data, name, robot)]
     return np.array([value for value in values if value is not None], float)
 
 
