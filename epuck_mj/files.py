@@ -144,4 +144,5 @@ DAMAGED = (
 
 def _temporary(path: Path) -> Path:
     """The name of a new file beside `path`."""
-    return path.with_name(f".{path.name}-{secrets.token_hex(4)}{TEMPORARY}")
+    # "." has no name to replace
+    return path.parent / f".{path.name}-{secrets.token_hex(4)}{TEMPORARY}"

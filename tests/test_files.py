@@ -30,6 +30,13 @@ def test_a_signal_right_after_a_file_was_made_leaves_nothing(tmp_path, monkeypat
     assert path.read_text() == "old"
 
 
+def test_what_is_no_file_s_name_fails_as_the_system_says(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(OSError, match=r"busy|directory"):
+        files.write_text(Path(), "new")
+    assert not [*tmp_path.iterdir()]
+
+
 def test_leftovers_are_ours_alone(tmp_path):
     mine = [".vscode-settings", ".my-settings", ".a-12345678", "a-12345678.tmp"]
     for name in (*mine, ".history.csv-0a1b2c3d.tmp"):
