@@ -27,7 +27,7 @@ from epuck_mj.bridge.serial_line import SerialLine
 from epuck_mj.bridge.session import Session
 from epuck_mj.calibration import Calibration
 from epuck_mj.control import Policy, TaskParameters
-from epuck_mj.controller import load
+from epuck_mj.controller_file import load
 from epuck_mj.files import read_arrays
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.wall_follower import WallFollower
@@ -61,7 +61,7 @@ def main(options: Options) -> None:
     task, policy = TaskParameters(), WallFollower()
     if options.champion is not None:
         file = load(options.champion)
-        task, policy = TaskParameters.from_dict(file.task), file.controller
+        task, policy = file.task, file.controller
     results = {}
     for robot in ROBOTS:
         results[robot] = measure(robot, policy, task, options.seconds)

@@ -19,7 +19,7 @@ import numpy as np
 import tyro
 
 from epuck_mj.control import BatchPolicy, TaskParameters, run_trials
-from epuck_mj.controller import load
+from epuck_mj.controller_file import load
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.simulation import SimulatedRobots
 from epuck_mj.starts import FreeSpace

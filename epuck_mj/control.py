@@ -7,7 +7,6 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from epuck_mj.constants import PROXIMITY_RANGE
-from epuck_mj.errors import UserError
 from epuck_mj.fitness import STEP_FITNESS_MAX, StepFitness, step_fitness
 from epuck_mj.motors import Speeds, command
 from epuck_mj.sensors import Reading, observe
@@ -63,7 +62,7 @@ class TaskParameters:
         """What `dataclasses.asdict` gave, as stored with a controller.
 
         Raises:
-            UserError: if the fields are others.
+            ValueError: if the fields are others.
         """
         try:
             task = cls(**{**fields, "speeds": Speeds(**fields["speeds"])})
@@ -73,7 +72,7 @@ class TaskParameters:
             if not all(0 < number < float("inf") for number in numbers):
                 raise ValueError(f"expected numbers above 0, got {numbers}")
         except (KeyError, TypeError, ValueError) as error:
-            raise UserError(f"not the parameters of a task: {error}") from None
+            raise ValueError(f"not the parameters of a task: {error}") from None
         return task
 
     @property

@@ -4,15 +4,12 @@ Sums are written out term by term instead of as a matrix product: BLAS orders a 
 by the size of the batch, and a controller must act the same alone and in a crowd.
 """
 
-import json
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any, Self
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from epuck_mj.constants import N_PROXIMITY
-from epuck_mj.errors import UserError
 
 N_ACTIONS = 2
 
@@ -121,78 +118,3 @@ def _half_tanh(x: np.ndarray) -> np.ndarray:
     """tanh(x / 2) = 2 sigmoid(x) - 1, in place: never overflows."""
     x *= 0.5
     return np.tanh(x, out=x)
-
-
-@dataclass(frozen=True)
-class ControllerFile:
-    """A controller with all that is needed to use it, as stored in JSON.
-
-    Attributes:
-        network: its shape.
-        genome: its weights, `(genes,)`.
-        task: what its world was: speeds, sensor law, fitness, steps (plain values).
-        scene: robot and arena it was evolved in, with hashes of their MJCF.
-        scores: stored and held-out fitness, and how each was measured.
-    """
-
-    network: Network
-    genome: np.ndarray
-    task: dict[str, Any]
-    scene: dict[str, Any]
-    scores: dict[str, Any]
-
-    @property
-    def controller(self) -> Controller:
-        """The controller, ready to be called."""
-        return self.network.decode(self.genome)
-
-    def to_json(self) -> str:
-        """The file's text; the genome comes back bit for bit."""
-        fields = {
-            "format": FORMAT,
-            "network": asdict(self.network),
-            "task": self.task,
-            "scene": self.scene,
-            "scores": self.scores,
-            "genome": [float(gene) for gene in self.genome],
-        }
-        return json.dumps(fields, indent=1) + "\n"
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """Read `to_json`'s text back.
-
-        Raises:
-            ValueError: if it is anything else.
-        """
-        fields = json.loads(text)
-        if not isinstance(fields, dict) or fields.get("format") != FORMAT:
-            raise ValueError(f"expected a JSON object with format '{FORMAT}'")
-        network = Network(**fields["network"])
-        genome = np.array(fields["genome"], float)
-        if genome.shape != (network.n_genes,) or not np.isfinite(genome).all():
-            raise ValueError(
-                f"expected {network.n_genes} finite genes, got {genome.size}"
-            )
-        parts = [fields[name] for name in ("task", "scene", "scores")]
-        if not all(isinstance(part, dict) for part in parts):
-            raise ValueError("expected objects as task, scene and scores")
-        return cls(network, genome, *parts)
-
-
-FORMAT = "epuck_mj.controller/1"
-
-
-def load(path: str | Path) -> ControllerFile:
-    """The controller stored at `path`.
-
-    Raises:
-        UserError: if there is none, or it is not a controller file.
-    """
-    path = Path(path)
-    try:
-        return ControllerFile.from_json(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UserError(f"cannot read controller '{path}': {error.strerror}") from None
-    except (ValueError, KeyError, TypeError) as error:
-        raise UserError(f"'{path}' is not a controller file: {error}") from None

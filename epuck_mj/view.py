@@ -23,7 +23,7 @@ import tyro
 
 from epuck_mj.command_line import main, parse
 from epuck_mj.control import ControlStep, Policy, TaskParameters, control_step
-from epuck_mj.controller import load
+from epuck_mj.controller_file import load
 from epuck_mj.errors import UserError
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.sensors import Reading, observe
@@ -218,7 +218,7 @@ def run(argv: Sequence[str]) -> int:
     task = TaskParameters()
     if options.champion is not None:
         file = load(options.champion)
-        policy, task = file.controller, TaskParameters.from_dict(file.task)
+        policy, task = file.controller, file.task
     if options.seconds is not None:
         ratio = options.seconds / task.control_step
         if not 0.5 <= ratio < float("inf"):

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from epuck_mj.controller import ControllerFile
+from epuck_mj.controller_file import ControllerFile
 from epuck_mj.files import writing
 from evolution.config import ExperimentConfig
 from evolution.evaluation import Engine

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from epuck_mj import controller, files
+from epuck_mj import controller_file, files
 from epuck_mj.control import Policy, TaskParameters
 from epuck_mj.errors import UserError
 from epuck_mj.tasks import START_CLEARANCE
@@ -91,23 +91,16 @@ def named_policies(path: str, generations: str | None = None) -> list[NamedPolic
 
 
 def _champion(path: Path, name: str, config: ExperimentConfig | None) -> NamedPolicy:
-    file = controller.load(path)
-    for key in ("robot", "arena"):
-        if not isinstance(file.scene.get(key), str):
-            raise UserError(f"'{path}' does not say which {key} it is for")
-    # older files do not say
-    clearance = config.start_clearance if config else START_CLEARANCE
-    clearance = file.scene.get("start_clearance", clearance)
-    if not isinstance(clearance, float) or not 0 < clearance <= 1:
-        raise UserError(
-            f"'{path}': expected a start_clearance in (0, 1] m, got {clearance!r}"
-        )
+    file = controller_file.load(path)
+    clearance = file.origin.start_clearance
+    if clearance is None:
+        clearance = config.start_clearance if config else START_CLEARANCE
     return NamedPolicy(
         name,
         file.controller,
-        TaskParameters.from_dict(file.task),
-        file.scene["robot"],
-        file.scene["arena"],
+        file.task,
+        file.origin.robot,
+        file.origin.arena,
         clearance,
         file.scores,
         config,

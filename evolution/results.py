@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from epuck_mj import files
-from epuck_mj.controller import ControllerFile
+from epuck_mj.controller_file import ControllerFile, Origin
 from epuck_mj.model import Scene
 from epuck_mj.pictures import save_figure
 from epuck_mj.recording import Trial, save_recording
@@ -86,7 +86,7 @@ def write_results(
 
 def summary(controller: ControllerFile) -> str:
     """Held-out fitness on each robot and stored fitness, in lines."""
-    scores, steps = controller.scores, controller.task["steps"]
+    scores, steps = controller.scores, controller.task.steps
     starts = next(iter(scores["held_out"].values()))["starts"]
     lines = [
         f"Held-out fitness of {steps}, mean of {starts} fresh starts: "
@@ -132,13 +132,13 @@ def _controller_file(
     return ControllerFile(
         network=config.network,
         genome=champion.genome,
-        task=asdict(config.task),
-        scene={
-            "robot": config.robot,
-            "arena": config.arena,
-            "start_clearance": config.start_clearance,
-            "mjcf_sha256": dict(experiment.scene.sha256),
-        },
+        task=config.task,
+        origin=Origin(
+            config.robot,
+            config.arena,
+            config.start_clearance,
+            dict(experiment.scene.sha256),
+        ),
         scores=scores,
     )
 

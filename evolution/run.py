@@ -13,7 +13,7 @@ from typing import Literal
 import tyro
 
 from epuck_mj.command_line import check_threads, command, main, parse
-from epuck_mj.controller import ControllerFile
+from epuck_mj.controller_file import ControllerFile
 from epuck_mj.errors import UserError
 from epuck_mj.interruption import Interrupted, Interruption
 from evolution.config import (

@@ -12,7 +12,7 @@ from pathlib import Path
 import tyro
 from tqdm import tqdm
 
-from epuck_mj import controller, files
+from epuck_mj import controller_file, files
 from epuck_mj.command_line import command, main, parse
 from epuck_mj.errors import UserError
 from epuck_mj.interruption import Interrupted, Interruption
@@ -194,7 +194,7 @@ def _shown(
 
 def _line(job: Job) -> str:
     """What a finished run has found."""
-    return f"{job}: " + scores(controller.load(job.directory / "champion.json"))
+    return f"{job}: " + scores(controller_file.load(job.directory / "champion.json"))
 
 
 if __name__ == "__main__":

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field, FiniteFloat, StrictInt, ValidationError
 
-from epuck_mj import controller
-from epuck_mj.control import TaskParameters
-from epuck_mj.controller import ControllerFile
+from epuck_mj import controller_file
+from epuck_mj.controller_file import ControllerFile
 from epuck_mj.errors import UserError
 from epuck_mj.wall_follower import YARDSTICK
 from evolution.config import ExperimentConfig, differing_keys
@@ -120,7 +119,7 @@ def load_study(path: Path) -> StudyData:
         raise UserError(f"no finished run in '{path}': {said}")
     missing += _unpaired({n: each for n, each in runs.items() if n not in asked})
     robots = {tuple(run.champion.scores["held_out"]) for run in everything}
-    steps = {run.champion.task["steps"] for run in everything}
+    steps = {run.champion.task.steps for run in everything}
     if len(robots) > 1 or len(steps) > 1:
         raise UserError(
             f"expected runs on the same robots and as many steps in '{path}', got "
@@ -155,9 +154,8 @@ def _run(directory: RunDirectory, config: ExperimentConfig, seed: int) -> RunDat
     differing = differing_keys(stored, config.model_copy(update={"seed": seed}))
     if differing:
         raise UserError(f"of another config: {', '.join(differing)}")
-    champion = controller.load(directory.champion)
+    champion = controller_file.load(directory.champion)
     check_scores(champion.scores, directory.champion)
-    TaskParameters.from_dict(champion.task)
     return RunData(seed, read_history(directory.history), champion, directory.path)
 
 

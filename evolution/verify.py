@@ -13,9 +13,9 @@ from pathlib import Path
 
 import tyro
 
-from epuck_mj import controller, files
+from epuck_mj import controller_file, files
 from epuck_mj.command_line import check_threads, main, parse
-from epuck_mj.controller import ControllerFile
+from epuck_mj.controller_file import ControllerFile
 from epuck_mj.errors import UserError
 from evolution.champion import held_out_disturbances
 from evolution.config import ExperimentConfig
@@ -78,7 +78,7 @@ def _runs(path: Path) -> list[RunDirectory]:
 
 def _verified(run: RunDirectory, judge: Callable[..., Judge]) -> bool:
     """Whether all scores are the same; says so, or what differs."""
-    config, champion = run.stored_config(), controller.load(run.champion)
+    config, champion = run.stored_config(), controller_file.load(run.champion)
     check_scores(champion.scores, run.champion)
     differing = [
         *_differing(champion, config, judge),
@@ -153,7 +153,7 @@ def _edited(
     """Whether robot or arena have been edited since."""
     world = config.arena, config.task, config.start_clearance
     now = dict(judge(config.robot, *world).scene.sha256)
-    if champion.scene.get("mjcf_sha256") != now:
+    if champion.origin.mjcf_sha256 != now:
         yield "its robot or arena has been edited since"
 
 

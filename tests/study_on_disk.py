@@ -2,13 +2,13 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from epuck_mj.control import TaskParameters
-from epuck_mj.controller import ControllerFile, Network
+from epuck_mj.controller import Network
+from epuck_mj.controller_file import ControllerFile, Origin
 from evolution.config import find_config, load_config
 from evolution.study_config import StudyConfig
 from evolution.study_directory import StudyDirectory
@@ -18,6 +18,7 @@ LEVELS = {"de-best": 220.0, "de-rand": 180.0, "ga": 120.0}
 POPULATIONS = {"de-best": 150, "de-rand": 120, "ga": 100}
 EVALUATIONS = 3000
 STEPS = 300
+ORIGIN = Origin("epuck_planar", "arena")
 
 
 def held_out(mean: float, rng: np.random.Generator) -> dict:
@@ -107,7 +108,7 @@ def _write_run(
     }
     genome = rng.uniform(-5, 5, Network().n_genes)
     champion = ControllerFile(
-        Network(), genome, asdict(TaskParameters(steps=STEPS)), {}, scores
+        Network(), genome, TaskParameters(steps=STEPS), ORIGIN, scores
     )
     run.champion.write_text(champion.to_json())
     provenance = {

@@ -8,8 +8,9 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from epuck_mj import controller, files
+from epuck_mj import controller_file, files
 from epuck_mj.control import control_step
+from epuck_mj.controller_file import Origin
 from epuck_mj.sensors import observe
 from epuck_mj.simulation import SimulatedRobots
 from evolution import champion as champion_module
@@ -239,7 +240,7 @@ def written(tmp_path_factory):
 def test_the_champion_file_loads_and_acts_bit_for_bit(written):
     experiment, directory = written
     champion = choose_champion(experiment.engine, experiment)
-    stored = controller.load(directory.champion)
+    stored = controller_file.load(directory.champion)
     assert stored.genome.tobytes() == champion.genome.tobytes()
     assert stored.network == experiment.config.network
     observation = np.random.default_rng(3).random((100, 8))
@@ -253,7 +254,7 @@ def test_the_champion_file_loads_and_acts_bit_for_bit(written):
 def test_the_champion_file_holds_every_score(written):
     experiment, directory = written
     champion = choose_champion(experiment.engine, experiment)
-    stored = controller.load(directory.champion)
+    stored = controller_file.load(directory.champion)
     policy = experiment.config.network.decode(champion.genome)
     tests = {
         robot: judge.test(policy)
@@ -271,13 +272,10 @@ def test_the_champion_file_holds_every_score(written):
         "held_out": json.loads(json.dumps({k: asdict(v) for k, v in tests.items()})),
         "most_believed": {"stored": believed, "held_out": worth.mean},
     }
-    assert stored.task["steps"] == 20
-    assert stored.scene == {
-        "robot": "epuck_planar",
-        "arena": "arena",
-        "start_clearance": 0.01,
-        "mjcf_sha256": dict(experiment.scene.sha256),
-    }
+    assert stored.task == experiment.config.task
+    assert stored.origin == Origin(
+        "epuck_planar", "arena", 0.01, dict(experiment.scene.sha256)
+    )
 
 
 def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
@@ -304,7 +302,7 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
 
 def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
     _, directory = written
-    stored = controller.load(directory.champion)
+    stored = controller_file.load(directory.champion)
     fresh, believed = summary(stored).splitlines()
     scores = stored.scores["held_out"]
     parts = []

@@ -1,13 +1,11 @@
 """The network against a slow loop, and controller files."""
 
-import json
 import math
 
 import numpy as np
 import pytest
 
-from epuck_mj.controller import Controller, ControllerFile, Network, load
-from epuck_mj.errors import UserError
+from epuck_mj.controller import Controller, Network
 
 
 def sigmoid(x: float) -> float:
@@ -97,55 +95,3 @@ def test_observations_and_genomes_are_left_alone():
 def test_wrong_length_is_refused():
     with pytest.raises(ValueError, match="expected genomes of 40 genes"):
         Network().decode(np.zeros(39))
-
-
-@pytest.fixture
-def stored() -> ControllerFile:
-    genome = np.random.default_rng(3).uniform(-5, 5, 40)
-    return ControllerFile(Network(), genome, {"steps": 300}, {"robot": "epuck"}, {})
-
-
-def test_file_comes_back_bit_for_bit(tmp_path, stored):
-    path = tmp_path / "champion.json"
-    path.write_text(stored.to_json())
-    back = load(path)
-    np.testing.assert_array_equal(back.genome, stored.genome)
-    assert (back.network, back.task, back.scene) == (
-        stored.network,
-        stored.task,
-        stored.scene,
-    )
-    observation = np.linspace(0, 1, 8)
-    np.testing.assert_array_equal(
-        back.controller(observation), stored.controller(observation)
-    )
-
-
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        ({"format": "other"}, "expected a JSON object with format"),
-        ({"genome": [1.0, 2.0]}, "expected 40 finite genes, got 2"),
-        ({"genome": [float("nan")] * 40}, "expected 40 finite genes"),
-        ({"network": {"layers": 3}}, "layers"),
-        ({"network": {"hidden": 5, "biases": False}}, "expected 50 finite genes"),
-    ],
-)
-def test_foreign_files_are_refused(tmp_path, stored, change, expected):
-    path = tmp_path / "champion.json"
-    path.write_text(json.dumps(json.loads(stored.to_json()) | change))
-    with pytest.raises(UserError, match="is not a controller file") as error:
-        load(path)
-    assert expected in str(error.value)
-
-
-def test_missing_and_broken_files_are_refused(tmp_path, stored):
-    with pytest.raises(UserError, match="cannot read controller"):
-        load(tmp_path / "nothing.json")
-    path = tmp_path / "half.json"
-    path.write_text(stored.to_json()[:100])
-    with pytest.raises(UserError, match="is not a controller file"):
-        load(path)
-    path.write_text("[1, 2]")
-    with pytest.raises(UserError, match="is not a controller file"):
-        load(path)

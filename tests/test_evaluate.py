@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from epuck_mj.calibration import Calibration
-from epuck_mj.controller import load
+from epuck_mj.controller_file import load
 from epuck_mj.errors import UserError
 from epuck_mj.files import read_arrays
 from epuck_mj.model import load_scene

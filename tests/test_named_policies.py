@@ -1,7 +1,6 @@
 """Policies by name: champions, past generations, the follower written by hand."""
 
 import shutil
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,8 @@ import pytest
 
 from epuck_mj import files
 from epuck_mj.control import TaskParameters
-from epuck_mj.controller import ControllerFile, Network
+from epuck_mj.controller import Network
+from epuck_mj.controller_file import ControllerFile, Origin
 from epuck_mj.errors import UserError
 from epuck_mj.wall_follower import WallFollower
 from evolution.config import ExperimentConfig, find_config, load_config
@@ -44,9 +44,8 @@ def copy(evolved, tmp_path) -> Path:
 def champion(path: Path, robot: str = "epuck_planar") -> Path:
     """A controller file of a first gene 1."""
     genome = np.eye(Network().n_genes)[0]
-    scene = {"robot": robot, "arena": "round"}
-    task = asdict(TaskParameters(steps=7))
-    file = ControllerFile(Network(), genome, task, scene, {"stored": 3.5})
+    task, origin = TaskParameters(steps=7), Origin(robot, "round")
+    file = ControllerFile(Network(), genome, task, origin, {"stored": 3.5})
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(file.to_json())
     return path
@@ -171,12 +170,10 @@ def test_an_unfinished_run_has_no_champion_yet(evolved):
     assert "expected the directory of a finished run" in refused(str(evolved))
 
 
-@pytest.mark.parametrize("scene", [{}, {"robot": "epuck"}, {"robot": 1, "arena": "a"}])
-def test_a_controller_for_nothing_is_one_line(scene, tmp_path):
-    task = asdict(TaskParameters())
-    file = ControllerFile(Network(), np.zeros(40), task, scene, {})
-    (tmp_path / "a.json").write_text(file.to_json())
-    assert "does not say which" in refused(str(tmp_path / "a.json"))
+def test_a_damaged_controller_is_one_line(tmp_path):
+    path = champion(tmp_path / "a.json")
+    path.write_text(path.read_text().replace('"arena"', '"place"'))
+    assert "does not say which arena" in refused(str(path))
 
 
 def test_labels_are_short_and_tell_apart():

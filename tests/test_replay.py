@@ -1,7 +1,7 @@
 """`evolution.replay`: what it shows of whom, and what it says to what it cannot."""
 
 import re
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,8 @@ from rerun.chunk import RrdReader
 
 from epuck_mj import files
 from epuck_mj.control import TaskParameters
-from epuck_mj.controller import ControllerFile, Network, load
+from epuck_mj.controller import Network
+from epuck_mj.controller_file import ControllerFile, Origin, load
 from epuck_mj.errors import UserError
 from epuck_mj.model import load_scene
 from epuck_mj.starts import FreeSpace
@@ -35,9 +36,9 @@ def here(tmp_path, monkeypatch):
 
 def write_champion(path, seed=0, arena="arena", **task):
     genome = np.random.default_rng(seed).uniform(-5, 5, Network().n_genes)
-    scene = {"robot": "epuck_planar", "arena": arena}
-    fields = asdict(TaskParameters(steps=STEPS)) | task
-    file = ControllerFile(Network(), genome, fields, scene, {"stored": 12.34})
+    parameters = replace(TaskParameters(steps=STEPS), **task)
+    origin = Origin("epuck_planar", arena)
+    file = ControllerFile(Network(), genome, parameters, origin, {"stored": 12.34})
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(file.to_json())
     return str(path)

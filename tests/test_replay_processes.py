@@ -8,7 +8,6 @@ import signal
 import socket
 import subprocess
 import sys
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,8 @@ from rerun.experimental import ViewerClient
 
 from epuck_mj import render
 from epuck_mj.control import TaskParameters
-from epuck_mj.controller import ControllerFile, Network
+from epuck_mj.controller import Network
+from epuck_mj.controller_file import ControllerFile, Origin
 from epuck_mj.errors import UserError
 from evolution.replay import command
 from evolution.replay.command import replay
@@ -48,9 +48,8 @@ def here(alone, monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "disabled")
     monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
     genome = np.random.default_rng(0).uniform(-5, 5, Network().n_genes)
-    scene = {"robot": "epuck_planar", "arena": "arena"}
-    task = asdict(TaskParameters(steps=8))
-    file = ControllerFile(Network(), genome, task, scene, {})
+    task, origin = TaskParameters(steps=8), Origin("epuck_planar", "arena")
+    file = ControllerFile(Network(), genome, task, origin, {})
     (alone / "champion.json").write_text(file.to_json())
     return alone
 

@@ -13,7 +13,9 @@ from matplotlib.legend import Legend
 from matplotlib.patches import Rectangle
 
 from epuck_mj.behaviour_classes import CLASSES
-from epuck_mj.controller import ControllerFile, Network
+from epuck_mj.control import TaskParameters
+from epuck_mj.controller import Network
+from epuck_mj.controller_file import ControllerFile, Origin
 from epuck_mj.errors import UserError
 from evolution.config import find_config, load_config
 from evolution.report.figures import FIGURES, figures, save
@@ -62,7 +64,9 @@ def a_run(name, seed, robots=ROBOTS, evaluations=30_000):
     }
     scores = {"stored": float(best.max()), "held_out": tests}
     genome = rng.uniform(-5, 5, Network().n_genes)
-    champion = ControllerFile(Network(), genome, {"steps": STEPS}, {}, scores)
+    champion = ControllerFile(
+        Network(), genome, TaskParameters(STEPS), Origin("epuck", "arena"), scores
+    )
     return RunData(seed, history, champion, Path("nowhere"))
 
 

@@ -22,7 +22,7 @@ import yaml
 from matplotlib.image import imread
 from rerun.chunk import RrdReader
 
-from epuck_mj import controller, files
+from epuck_mj import controller_file, files
 from epuck_mj.calibration import Calibration
 from epuck_mj.errors import UserError
 from epuck_mj.model import MODELS
@@ -281,7 +281,7 @@ def test_the_checkpoint_holds_every_generation(finished):
 
 def test_the_champions_file_pictures_and_recordings_can_be_read(finished):
     directory, _ = finished
-    stored = controller.load(directory / "champion.json")
+    stored = controller_file.load(directory / "champion.json")
     assert stored.genome.shape == (40,)
     assert set(stored.scores["held_out"]) == {"epuck_planar", "epuck"}
     assert 1 <= Trajectory.load(directory / "trajectory.npz").steps <= 20
@@ -294,7 +294,7 @@ def test_the_champions_file_pictures_and_recordings_can_be_read(finished):
 
 def test_the_summary_is_in_plain_words(finished):
     directory, process = finished
-    scores = controller.load(directory / "champion.json").scores
+    scores = controller_file.load(directory / "champion.json").scores
     first, fresh, stored, written, replay = process.stdout.splitlines()
     assert re.fullmatch(
         r"ga, seed 7: 60 evaluations in 6 generations, \d+ min \d+ s", first
@@ -427,9 +427,9 @@ def test_a_run_on_an_own_robot_of_another_name(here, quick, capsys):
     out = capsys.readouterr().out
     assert "fresh starts: mine.xml " in out
     assert "crash), epuck " in out
-    scene = controller.load("out/champion.json").scene
-    assert scene["robot"] == str(here / "mine.xml")
-    assert set(scene["mjcf_sha256"]) == {"arena", "robot"}
+    origin = controller_file.load("out/champion.json").origin
+    assert origin.robot == str(here / "mine.xml")
+    assert set(origin.mjcf_sha256) == {"arena", "robot"}
     # the same robot by its name is the same run
     assert run(["ga", *SHORT, "--output", "named"]) == 0
     history = (here / "named" / "history.csv").read_bytes()
@@ -440,7 +440,7 @@ def test_the_wheeled_robot_is_tested_on_the_plane_as_well(here, quick, capsys):
     assert run(["ga", *SHORT, "--robot", "epuck", "--output", "out"]) == 0
     out = capsys.readouterr().out
     assert out.count("Held-out fitness") == 1
-    tests = controller.load("out/champion.json").scores["held_out"]
+    tests = controller_file.load("out/champion.json").scores["held_out"]
     assert list(tests) == ["epuck", "epuck_planar"]
 
 

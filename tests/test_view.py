@@ -6,14 +6,14 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import asdict
 
 import numpy as np
 import pytest
 
 from epuck_mj import view
 from epuck_mj.control import TaskParameters
-from epuck_mj.controller import ControllerFile, Network
+from epuck_mj.controller import Network
+from epuck_mj.controller_file import ControllerFile, Origin
 from epuck_mj.errors import UserError
 from epuck_mj.model import MODELS, load_scene
 from epuck_mj.starts import FreeSpace
@@ -32,8 +32,8 @@ def straight_on(observation):
 @pytest.fixture
 def champion(tmp_path):
     genome = np.random.default_rng(1).normal(size=Network().n_genes)
-    scene = {"robot": "epuck", "arena": "arena"}
-    file = ControllerFile(Network(), genome, asdict(TaskParameters()), scene, {})
+    origin = Origin("epuck", "arena")
+    file = ControllerFile(Network(), genome, TaskParameters(), origin, {})
     path = tmp_path / "champion.json"
     path.write_text(file.to_json())
     return path

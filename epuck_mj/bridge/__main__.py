@@ -16,7 +16,7 @@ from epuck_mj.calibration import Calibration
 from epuck_mj.command_line import main, parse
 from epuck_mj.constants import SPEED_MAX
 from epuck_mj.control import Policy, TaskParameters
-from epuck_mj.controller import load
+from epuck_mj.controller_file import load
 from epuck_mj.errors import UserError
 from epuck_mj.model import load_scene
 from epuck_mj.wall_follower import YARDSTICK, WallFollower
@@ -111,10 +111,7 @@ def _champion(name: str) -> tuple[Policy, TaskParameters, str, str]:
     if name == YARDSTICK:
         return WallFollower(), TaskParameters(), "epuck", "arena"
     file = load(name)
-    robot, arena = (file.scene.get(key) for key in ("robot", "arena"))
-    if not isinstance(robot, str) or not isinstance(arena, str):
-        raise UserError(f"'{name}' does not say which robot and arena it is for")
-    return file.controller, TaskParameters.from_dict(file.task), robot, arena
+    return file.controller, file.task, file.origin.robot, file.origin.arena
 
 
 if __name__ == "__main__":

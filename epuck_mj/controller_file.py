@@ -1,0 +1,126 @@
+"""Controller files: a controller with its task, its origin and its worth, as JSON."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from epuck_mj.control import TaskParameters
+from epuck_mj.controller import Controller, Network
+from epuck_mj.errors import UserError
+
+FORMAT = "epuck_mj.controller/1"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a controller was evolved.
+
+    Attributes:
+        robot: name of a shipped robot, or path of its MJCF.
+        arena: name of a shipped arena, or path of its MJCF.
+        start_clearance: least distance from the shell to a wall at a start [m]; None
+            if the file does not say.
+        mjcf_sha256: of each text compiled: `arena`, `robot`, and includes by name.
+    """
+
+    robot: str
+    arena: str
+    start_clearance: float | None = None
+    mjcf_sha256: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
+        """What `dataclasses.asdict` gave; what else is there says nothing.
+
+        Raises:
+            ValueError: if it is anything else.
+        """
+        for key in ("robot", "arena"):
+            if not isinstance(fields.get(key), str):
+                raise ValueError(f"it does not say which {key} it is for")
+        clearance = fields.get("start_clearance")
+        known = isinstance(clearance, float) and 0 < clearance <= 1
+        if clearance is not None and not known:
+            raise ValueError(
+                f"expected a start_clearance in (0, 1] m, got {clearance!r}"
+            )
+        hashes = fields.get("mjcf_sha256", {})
+        return cls(fields["robot"], fields["arena"], clearance, hashes)
+
+
+@dataclass(frozen=True)
+class ControllerFile:
+    """A controller with all that is needed to use it.
+
+    Attributes:
+        network: its shape.
+        genome: its weights, `(genes,)`.
+        task: what its trials were.
+        origin: where it was evolved; `scene` in the JSON.
+        scores: stored and held-out fitness, and how each was measured.
+    """
+
+    network: Network
+    genome: np.ndarray
+    task: TaskParameters
+    origin: Origin
+    scores: dict[str, Any]
+
+    @property
+    def controller(self) -> Controller:
+        """The controller, ready to be called."""
+        return self.network.decode(self.genome)
+
+    def to_json(self) -> str:
+        """The file's text; the genome comes back bit for bit."""
+        fields = {
+            "format": FORMAT,
+            "network": asdict(self.network),
+            "task": asdict(self.task),
+            "scene": asdict(self.origin),
+            "scores": self.scores,
+            "genome": [float(gene) for gene in self.genome],
+        }
+        return json.dumps(fields, indent=1) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Read `to_json`'s text back.
+
+        Raises:
+            ValueError: if it is anything else.
+        """
+        fields = json.loads(text)
+        if not isinstance(fields, dict) or fields.get("format") != FORMAT:
+            raise ValueError(f"expected a JSON object with format '{FORMAT}'")
+        for name in ("network", "task", "scene", "scores"):
+            if not isinstance(fields.get(name), dict):
+                raise ValueError(f"expected an object as {name}")
+        network = Network(**fields["network"])
+        genome = np.array(fields["genome"], float)
+        if genome.shape != (network.n_genes,) or not np.isfinite(genome).all():
+            raise ValueError(
+                f"expected {network.n_genes} finite genes, got {genome.size}"
+            )
+        task = TaskParameters.from_dict(fields["task"])
+        origin = Origin.from_dict(fields["scene"])
+        return cls(network, genome, task, origin, fields["scores"])
+
+
+def load(path: str | Path) -> ControllerFile:
+    """The controller stored at `path`.
+
+    Raises:
+        UserError: if there is none, or it is not a controller file.
+    """
+    path = Path(path)
+    try:
+        return ControllerFile.from_json(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UserError(f"cannot read controller '{path}': {error.strerror}") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise UserError(f"'{path}' is not a controller file: {error}") from None

@@ -1,0 +1,85 @@
+import json
+
+import numpy as np
+import pytest
+
+from epuck_mj.control import TaskParameters
+from epuck_mj.controller import Network
+from epuck_mj.controller_file import ControllerFile, Origin, load
+from epuck_mj.errors import UserError
+
+
+@pytest.fixture
+def stored() -> ControllerFile:
+    genome = np.random.default_rng(3).uniform(-5, 5, 40)
+    origin = Origin("epuck", "arena", 0.02, {"arena": "ab", "robot": "cd"})
+    return ControllerFile(
+        Network(), genome, TaskParameters(7, fitness="literal"), origin, {"stored": 1.0}
+    )
+
+
+def test_file_comes_back_bit_for_bit(tmp_path, stored):
+    path = tmp_path / "champion.json"
+    path.write_text(stored.to_json())
+    back = load(path)
+    np.testing.assert_array_equal(back.genome, stored.genome)
+    for name in ("network", "task", "origin", "scores"):
+        assert getattr(back, name) == getattr(stored, name)
+    observation = np.linspace(0, 1, 8)
+    np.testing.assert_array_equal(
+        back.controller(observation), stored.controller(observation)
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"format": "other"}, "expected a JSON object with format"),
+        ({"genome": [1.0, 2.0]}, "expected 40 finite genes, got 2"),
+        ({"genome": [float("nan")] * 40}, "expected 40 finite genes"),
+        ({"network": {"layers": 3}}, "layers"),
+        ({"network": {"hidden": 5, "biases": False}}, "expected 50 finite genes"),
+        ({"network": None}, "expected an object as network"),
+        ({"scores": [1.0]}, "expected an object as scores"),
+        ({"task": {}}, "not the parameters of a task: 'speeds'"),
+        ({"scene": {}}, "does not say which robot it is for"),
+        ({"scene": {"robot": "epuck"}}, "does not say which arena it is for"),
+        ({"scene": {"robot": 1, "arena": "arena"}}, "which robot it is for"),
+        (
+            {"scene": {"robot": "a", "arena": "b", "start_clearance": 2.0}},
+            "expected a start_clearance in (0, 1] m, got 2.0",
+        ),
+    ],
+)
+def test_foreign_files_are_refused(tmp_path, stored, change, expected):
+    path = tmp_path / "champion.json"
+    path.write_text(json.dumps(json.loads(stored.to_json()) | change))
+    with pytest.raises(UserError, match="is not a controller file") as error:
+        load(path)
+    assert expected in str(error.value)
+
+
+def test_missing_and_broken_files_are_refused(tmp_path, stored):
+    with pytest.raises(UserError, match="cannot read controller"):
+        load(tmp_path / "nothing.json")
+    path = tmp_path / "half.json"
+    path.write_text(stored.to_json()[:100])
+    with pytest.raises(UserError, match="is not a controller file"):
+        load(path)
+    path.write_text("[1, 2]")
+    with pytest.raises(UserError, match="is not a controller file"):
+        load(path)
+
+
+def test_files_of_before_do_not_say_how_clear_their_starts_were(tmp_path, stored):
+    fields = json.loads(stored.to_json())
+    del fields["scene"]["start_clearance"]
+    fields["scene"]["note"] = "of a person"
+    path = tmp_path / "champion.json"
+    path.write_text(json.dumps(fields))
+    origin = load(path).origin
+    assert (origin.robot, origin.arena, origin.start_clearance) == (
+        "epuck",
+        "arena",
+        None,
+    )
