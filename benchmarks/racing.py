@@ -20,7 +20,7 @@ import tyro
 from epuck_mj import files
 from epuck_mj.command_line import main, parse
 from epuck_mj.control import Trials
-from evolution.config import find_config, load_config
+from evolution.config_files import find_config, load_config
 from evolution.evaluation import BatchEngine, Work
 from evolution.experiment import Experiment
 from evolution.study_config import parse_seeds

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from epuck_mj import files
 from epuck_mj.command_line import main, parse
-from evolution.config import find_config, load_config
+from evolution.config_files import find_config, load_config
 from evolution.evaluation import BatchEngine
 from evolution.execution import Means
 from evolution.held_out import Judge

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-import yaml
 
 from epuck_mj.constants import N_PROXIMITY, N_WHEELS, TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.files import write_text, writing
+from epuck_mj.yaml_files import read_mapping, to_yaml
 
 GAIN_MAX = 100.0
 """What no sensor's gain reaches."""
@@ -77,7 +77,7 @@ class Calibration:
             "track": float(self.track),
         }
         with writing(path.parent):
-            write_text(path, yaml.safe_dump(content, sort_keys=False))
+            write_text(path, to_yaml(content))
 
     @classmethod
     def load(cls, path: Path) -> Self:
@@ -87,11 +87,7 @@ class Calibration:
             UserError: if the file is missing, damaged or something else.
         """
         try:
-            content = yaml.safe_load(path.read_text(encoding="utf-8"))
-            return cls.from_dict(content)
-        except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-            reason = " ".join(str(error).split())
-            raise UserError(f"cannot read calibration '{path}': {reason}") from None
+            return cls.from_dict(read_mapping(path))
         except ValueError as error:
             raise UserError(f"'{path}' is not a calibration: {error}") from None
 

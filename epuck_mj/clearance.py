@@ -16,7 +16,8 @@ from mujoco.batch import Batch
 
 from epuck_mj.errors import UserError
 from epuck_mj.geometry import walls
-from epuck_mj.model import SHELL, Scene
+from epuck_mj.interface import SHELL
+from epuck_mj.model import Scene
 
 CLEARANCE_MAX = 0.2
 """Clearance from which on nobody looks for the nearest wall [m]: costs time."""

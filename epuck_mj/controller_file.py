@@ -11,6 +11,7 @@ import numpy as np
 from epuck_mj.control import TaskParameters
 from epuck_mj.controller import Controller, Network
 from epuck_mj.errors import UserError
+from epuck_mj.files import read_text
 
 FORMAT = "epuck_mj.controller/1"
 
@@ -117,10 +118,8 @@ def load(path: str | Path) -> ControllerFile:
     Raises:
         UserError: if there is none, or it is not a controller file.
     """
-    path = Path(path)
+    text = read_text(Path(path))
     try:
-        return ControllerFile.from_json(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UserError(f"cannot read controller '{path}': {error.strerror}") from None
+        return ControllerFile.from_json(text)
     except (ValueError, KeyError, TypeError) as error:
         raise UserError(f"'{path}' is not a controller file: {error}") from None

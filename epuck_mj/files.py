@@ -60,6 +60,27 @@ def is_directory(path: Path) -> bool:
         return False
 
 
+def find(name: str, kind: str, shipped: Mapping[str, Path], form: str) -> Path:
+    """The file that a name or a path means.
+
+    Args:
+        name: of a shipped file, or the path of a person's own.
+        kind: what it is.
+        shipped: files by name.
+        form: what its text is called.
+
+    Raises:
+        UserError: if there is none.
+    """
+    path = shipped.get(name, Path(name))
+    if is_file(path):
+        return path
+    raise UserError(
+        f"no {kind} '{name}': expected the path of {form} file or one of "
+        + ", ".join(shipped)
+    )
+
+
 @contextmanager
 def writing(folder: Path) -> Iterator[None]:
     """What cannot be written in the block is the user's to put right.
@@ -106,6 +127,21 @@ def remove_leftovers(folder: Path) -> None:
     """Remove what killed writers left."""
     for path in leftovers(folder):
         path.unlink(missing_ok=True)
+
+
+def read_text(path: Path) -> str:
+    """The text of a file.
+
+    Raises:
+        UserError: if it is missing, or not UTF-8.
+    """
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"cannot read '{path}': {error.strerror}") from None
+    except ValueError as error:
+        # not UTF-8, or no name for a file
+        raise UserError(f"cannot read '{path}': {error}") from None
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:

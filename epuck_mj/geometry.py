@@ -3,7 +3,8 @@
 import mujoco
 import numpy as np
 
-from epuck_mj.model import PROXIMITY, SHELL, Scene, can_touch, static
+from epuck_mj.interface import PROXIMITY, SHELL, can_touch, static
+from epuck_mj.model import Scene
 
 UNSET_COLOR = np.array([0.5, 0.5, 0.5, 1], np.float32)
 """Colour that MuJoCo gives to geoms without one."""

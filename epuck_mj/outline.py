@@ -4,7 +4,8 @@ import mujoco
 import numpy as np
 
 from epuck_mj.geometry import walls
-from epuck_mj.model import SHELL, Scene
+from epuck_mj.interface import SHELL
+from epuck_mj.model import Scene
 
 OUTLINE_POINTS = 64
 """Directions in which an outline is looked for."""

@@ -9,7 +9,8 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from epuck_mj.model import ROBOT_BODY, SHELL, Scene
+from epuck_mj.interface import ROBOT_BODY, SHELL
+from epuck_mj.model import Scene
 from epuck_mj.sensors import Reading
 
 SPARE_SPEED = 2.0

@@ -14,7 +14,8 @@ from scipy import ndimage
 
 from epuck_mj.errors import UserError
 from epuck_mj.geometry import box_around, walls
-from epuck_mj.model import ROBOT_BODY, SHELL, Scene
+from epuck_mj.interface import ROBOT_BODY, SHELL
+from epuck_mj.model import Scene
 
 NODES_MAX = 400
 """Most grid nodes along one side of the arena."""

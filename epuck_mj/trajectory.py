@@ -13,7 +13,7 @@ from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.control import Policy, TaskParameters, control_step
 from epuck_mj.controller import Controller
 from epuck_mj.errors import UserError
-from epuck_mj.files import read_arrays, write_arrays
+from epuck_mj.files import read_arrays, write_arrays, writing
 from epuck_mj.model import Scene
 from epuck_mj.sensors import observe, proximity
 from epuck_mj.simulation import SimulatedRobots
@@ -104,10 +104,8 @@ class Trajectory:
             UserError: if it cannot be written.
         """
         arrays = {field.name: getattr(self, field.name) for field in fields(self)}
-        try:
+        with writing(Path(path)):
             write_arrays(Path(path), {"format": np.array(FORMAT), **arrays})
-        except OSError as error:
-            raise UserError(f"cannot write '{path}': {error.strerror}") from None
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

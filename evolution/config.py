@@ -4,7 +4,6 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-import yaml
 from pydantic import (
     BaseModel,
     BeforeValidator,
@@ -23,15 +22,12 @@ from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
 from epuck_mj.control import TaskParameters
 from epuck_mj.controller import Network
 from epuck_mj.errors import UserError
-from epuck_mj.files import is_file
-from epuck_mj.model import absolute
+from epuck_mj.mjcf import absolute
 from epuck_mj.motors import Speeds
 from epuck_mj.tasks import START_CLEARANCE
+from epuck_mj.yaml_files import parse, to_yaml
 from evolution.conditions import Conditions
 from evolution.optimizer import ALGORITHMS, OptimizerParameters, SearchSpace
-
-CONFIGS = Path(__file__).resolve().parent / "configs"
-DEFAULT_EXPERIMENT = "de-best"
 
 
 def _of_known_algorithm(value: Any) -> Any:
@@ -200,7 +196,7 @@ class ExperimentConfig(BaseModel):
 
     def to_yaml(self) -> str:
         """The resolved config: every key, in the order above."""
-        return yaml.safe_dump(self.model_dump(), sort_keys=False)
+        return to_yaml(self.model_dump())
 
     @classmethod
     def from_yaml(cls, text: str, where: str) -> Self:
@@ -209,11 +205,7 @@ class ExperimentConfig(BaseModel):
         Raises:
             UserError: beginning with `where`, if it is anything else.
         """
-        try:
-            return cls.parsed(yaml.safe_load(text), where)
-        except yaml.YAMLError as error:
-            reason = " ".join(str(error).split())
-            raise UserError(f"{where} is not YAML: {reason}") from None
+        return cls.parsed(parse(text, where), where)
 
     @classmethod
     def parsed(cls, fields: Any, where: str) -> Self:
@@ -226,40 +218,6 @@ class ExperimentConfig(BaseModel):
             return cls.model_validate(fields)
         except ValidationError as error:
             raise UserError(f"{where}: {one_line(error)}") from None
-
-
-def shipped_experiments() -> dict[str, Path]:
-    """Files of the shipped experiments by name; studies are kept beside them."""
-    return {
-        path.stem: path
-        for path in sorted(CONFIGS.glob("*.yaml"), key=lambda path: path.stem)
-        if "optimizer" in read_mapping(path)
-    }
-
-
-def find_config(experiment: str) -> Path:
-    """The file of a shipped experiment, or the user's own.
-
-    Raises:
-        UserError: if there is none.
-    """
-    shipped = shipped_experiments()
-    path = shipped.get(experiment, Path(experiment))
-    if is_file(path):
-        return path
-    raise UserError(
-        f"no experiment '{experiment}': expected the path of a YAML file or one of "
-        + ", ".join(shipped)
-    )
-
-
-def load_config(path: Path) -> ExperimentConfig:
-    """Read an experiment.
-
-    Raises:
-        UserError: if the file is missing, not YAML, or says something unknown.
-    """
-    return ExperimentConfig.parsed(read_mapping(path), f"'{path}'")
 
 
 def differing_keys(stored: ExperimentConfig, asked: ExperimentConfig) -> list[str]:
@@ -277,28 +235,6 @@ def flat(config: ExperimentConfig) -> dict[str, Any]:
     fields = config.model_dump()
     optimizer = fields.pop("optimizer")
     return fields | {f"optimizer.{key}": value for key, value in optimizer.items()}
-
-
-def read_mapping(path: Path) -> dict[Any, Any]:
-    """The keys and values of a YAML file.
-
-    Raises:
-        UserError: if it is missing, not YAML, or anything but a mapping.
-    """
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"cannot read '{path}': {error}") from None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise UserError(f"'{path}' is not YAML: {' '.join(str(error).split())}") from (
-            None
-        )
-    if not isinstance(content, dict):
-        raise UserError(
-            f"'{path}': expected a mapping of keys to values, "
-            f"got {type(content).__name__}"
-        )
-    return content
 
 
 def one_line(error: ValidationError) -> str:

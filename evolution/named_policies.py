@@ -16,7 +16,8 @@ from epuck_mj.control import Policy, TaskParameters
 from epuck_mj.errors import UserError
 from epuck_mj.tasks import START_CLEARANCE
 from epuck_mj.wall_follower import YARDSTICK, WallFollower
-from evolution.config import ExperimentConfig, load_config
+from evolution.config import ExperimentConfig
+from evolution.config_files import load_config
 from evolution.run_directory import RunDirectory
 from evolution.study_directory import champions
 

@@ -16,12 +16,8 @@ from epuck_mj.command_line import check_threads, command, main, parse
 from epuck_mj.controller_file import ControllerFile
 from epuck_mj.errors import UserError
 from epuck_mj.interruption import Interrupted, Interruption
-from evolution.config import (
-    DEFAULT_EXPERIMENT,
-    ExperimentConfig,
-    find_config,
-    load_config,
-)
+from evolution.config import ExperimentConfig
+from evolution.config_files import DEFAULT_EXPERIMENT, find_config, load_config
 from evolution.execution import Means, Run
 from evolution.live import Live, require_viewer
 from evolution.progress import Progress

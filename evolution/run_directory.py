@@ -11,7 +11,8 @@ from filelock import FileLock, Timeout
 
 from epuck_mj import files
 from epuck_mj.errors import UserError
-from evolution.config import ExperimentConfig, differing_keys, load_config
+from evolution.config import ExperimentConfig, differing_keys
+from evolution.config_files import load_config
 from evolution.experiment import Experiment
 from evolution.provenance import now, to_json
 
@@ -253,12 +254,13 @@ class RunDirectory:
         """
         if not files.is_file(self.provenance):
             return {}
+        text = files.read_text(self.provenance)
         try:
-            fields = json.loads(self.provenance.read_text(encoding="utf-8"))
+            fields = json.loads(text)
             if not isinstance(fields, dict):
                 raise ValueError("not an object")
             if not isinstance(fields.get("resumed", []), list):
                 raise ValueError("'resumed' is not a list")
-        except (OSError, ValueError) as error:
-            raise UserError(f"cannot read '{self.provenance}': {error}") from None
+        except ValueError as error:
+            raise UserError(f"'{self.provenance}' is damaged: {error}") from None
         return fields

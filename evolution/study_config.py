@@ -7,18 +7,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Self
 
-import yaml
-
 from epuck_mj.errors import UserError
-from epuck_mj.files import is_file
-from evolution.config import (
-    CONFIGS,
-    ExperimentConfig,
-    differing_keys,
-    find_config,
-    load_config,
-    read_mapping,
-)
+from epuck_mj.files import find
+from epuck_mj.yaml_files import read_mapping, to_yaml
+from evolution.config import ExperimentConfig, differing_keys
+from evolution.config_files import find_config, load_config, shipped_with
 
 KEYS = ("experiments", "common")
 
@@ -104,7 +97,7 @@ class StudyConfig:
     def to_yaml(self) -> str:
         """All experiments with all their keys, as `from_yaml` reads them."""
         fields = {name: c.model_dump() for name, c in self.experiments.items()}
-        return yaml.safe_dump(fields, sort_keys=False)
+        return to_yaml(fields)
 
     @classmethod
     def from_yaml(cls, path: Path) -> Self:
@@ -128,18 +121,7 @@ def find_study(study: str) -> Path:
     Raises:
         UserError: if there is none.
     """
-    shipped = {
-        path.stem: path
-        for path in sorted(CONFIGS.glob("*.yaml"))
-        if "experiments" in read_mapping(path)
-    }
-    path = shipped.get(study, Path(study))
-    if is_file(path):
-        return path
-    raise UserError(
-        f"no study '{study}': expected the path of a YAML file or one of "
-        + ", ".join(shipped)
-    )
+    return find(study, "study", shipped_with("experiments"), "a YAML")
 
 
 def parse_seeds(text: str) -> list[int]:
@@ -182,7 +164,7 @@ def seeds_text(seeds: Sequence[int]) -> str:
 def seeds_to_yaml(seeds: Mapping[str, Sequence[int]]) -> str:
     """Ascending seeds of experiments by name, as `seeds_from_yaml` reads them."""
     texts = {name: seeds_text(each) for name, each in seeds.items()}
-    return yaml.safe_dump(texts, sort_keys=False)
+    return to_yaml(texts)
 
 
 def seeds_from_yaml(path: Path) -> dict[str, list[int]]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field, FiniteFloat, StrictInt, ValidationError
 
-from epuck_mj import controller_file
+from epuck_mj import controller_file, files
 from epuck_mj.controller_file import ControllerFile
 from epuck_mj.errors import UserError
 from epuck_mj.wall_follower import YARDSTICK
@@ -207,8 +207,9 @@ def read_history(path: Path) -> dict[str, np.ndarray]:
     Raises:
         UserError: if it cannot be read, or is damaged.
     """
+    text = files.read_text(path)
     try:
-        header, *lines = path.read_text(encoding="utf-8").splitlines()
+        header, *lines = text.splitlines()
         rows = np.array([[float(x) for x in line.split(",")] for line in lines])
         if header != ",".join(HISTORY) or rows.ndim != 2 or not len(rows):
             raise ValueError(f"expected rows of {','.join(HISTORY)}")
@@ -216,8 +217,6 @@ def read_history(path: Path) -> dict[str, np.ndarray]:
         spent = np.diff(columns["evaluations"], prepend=0)
         if (spent <= 0).any() or not np.isfinite(rows).all():
             raise ValueError("evaluations do not rise, or a value is not finite")
-    except OSError as error:
-        raise UserError(f"cannot read '{path}': {error.strerror}") from None
     except ValueError as error:
         raise UserError(f"'{path}' is damaged: {error}") from None
     return columns
@@ -244,9 +243,9 @@ def _yardstick(directory: StudyDirectory, robots: Sequence[str]) -> dict[str, di
     if not path.is_file():
         return {}
     try:
-        fields = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise UserError(f"cannot read '{path}': {error}") from None
+        fields = json.loads(files.read_text(path))
+    except ValueError as error:
+        raise UserError(f"'{path}' is damaged: {error}") from None
     check_scores(fields, path, _Yardstick)
     missing = [robot for robot in robots if robot not in fields["held_out"]]
     if missing:

@@ -9,7 +9,7 @@ import numpy as np
 from epuck_mj.control import TaskParameters
 from epuck_mj.controller import Network
 from epuck_mj.controller_file import ControllerFile, Origin
-from evolution.config import find_config, load_config
+from evolution.config_files import find_config, load_config
 from evolution.study_config import StudyConfig
 from evolution.study_directory import StudyDirectory
 

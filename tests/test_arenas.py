@@ -10,7 +10,8 @@ from scipy import spatial
 
 from epuck_mj.clearance import ClearanceProbe
 from epuck_mj.control import TaskParameters
-from epuck_mj.model import MODELS, load_scene
+from epuck_mj.mjcf import MODELS
+from epuck_mj.model import load_scene
 from epuck_mj.starts import FreeSpace
 from epuck_mj.tasks import START_CLEARANCE
 from epuck_mj.wall_follower import WallFollower

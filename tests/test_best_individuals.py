@@ -9,7 +9,8 @@ import pytest
 from epuck_mj import files
 from epuck_mj.errors import UserError
 from evolution import execution
-from evolution.config import ExperimentConfig, find_config, load_config
+from evolution.config import ExperimentConfig
+from evolution.config_files import find_config, load_config
 from evolution.execution import Means, Run
 from evolution.named_policies import named_policies
 from evolution.run_directory import RunDirectory

@@ -343,7 +343,7 @@ def test_the_next_bridge_stops_a_robot_first(planar, port, tmp_path):
     [
         ([], "expected a controller file or wall-follower"),
         (["wall-follower"], "expected --port; --list-ports"),
-        (["no.json", "--port", "x"], "cannot read controller 'no.json'"),
+        (["no.json", "--port", "x"], "cannot read 'no.json'"),
         (["README.md", "--port", "x"], "'README.md' is not a controller file"),
         (["wall-follower", "--port", "/dev/nope"], "no port '/dev/nope'; available"),
         (["wall-follower", "--port", "/dev/null"], "is not a serial port"),

@@ -45,7 +45,8 @@ from epuck_mj.disturbances import Noise, calibrated
 from epuck_mj.disturbed_robots import DisturbedRobots
 from epuck_mj.errors import UserError
 from epuck_mj.interruption import SIGNALS
-from epuck_mj.model import MODELS, load_scene
+from epuck_mj.mjcf import MODELS
+from epuck_mj.model import load_scene
 from epuck_mj.motors import STEP_ANGLE
 from epuck_mj.sensors import counted, proximity
 from epuck_mj.simulation import SimulatedRobots

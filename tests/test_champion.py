@@ -25,7 +25,8 @@ from evolution.champion import (
     starts_for_test,
     starts_for_validation,
 )
-from evolution.config import ExperimentConfig, find_config, load_config
+from evolution.config import ExperimentConfig
+from evolution.config_files import find_config, load_config
 from evolution.experiment import Experiment, Purpose, Record
 from evolution.held_out import Judge
 from evolution.results import judges, summary, write_results

@@ -15,7 +15,7 @@ from epuck_mj.check.__main__ import run
 from epuck_mj.check.findings import Severity
 from epuck_mj.check.walls import seen_by_rays
 from epuck_mj.errors import UserError
-from epuck_mj.model import MODELS
+from epuck_mj.mjcf import MODELS
 
 ROBOTS = ("epuck", "epuck_planar")
 SHIPPED = [path.stem for path in sorted(MODELS.glob("arenas/*.xml"))] + ["arena"]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from evolution.config import find_config, load_config
+from evolution.config_files import find_config, load_config
 from evolution.report.claims import (
     Claim,
     claims,

@@ -20,7 +20,8 @@ from distributed import Client
 
 from epuck_mj.errors import UserError
 from evolution.cluster import carry_out_on_cluster, connection, world
-from evolution.config import ExperimentConfig, find_config, load_config
+from evolution.config import ExperimentConfig
+from evolution.config_files import find_config, load_config
 from evolution.execution import Means
 from evolution.jobs import Event, Job, carry_out, generations
 

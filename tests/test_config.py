@@ -9,9 +9,9 @@ from pydantic import ValidationError
 
 from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
 from epuck_mj.errors import UserError
-from evolution.config import (
+from evolution.config import ExperimentConfig
+from evolution.config_files import (
     CONFIGS,
-    ExperimentConfig,
     find_config,
     load_config,
     shipped_experiments,

@@ -60,7 +60,7 @@ def test_foreign_files_are_refused(tmp_path, stored, change, expected):
 
 
 def test_missing_and_broken_files_are_refused(tmp_path, stored):
-    with pytest.raises(UserError, match="cannot read controller"):
+    with pytest.raises(UserError, match="cannot read"):
         load(tmp_path / "nothing.json")
     path = tmp_path / "half.json"
     path.write_text(stored.to_json()[:100])

@@ -21,7 +21,8 @@ from epuck_mj.disturbances import (
 )
 from epuck_mj.disturbed_robots import DisturbedRobots
 from epuck_mj.errors import UserError
-from epuck_mj.model import ROBOT_BODY, load_scene
+from epuck_mj.interface import ROBOT_BODY
+from epuck_mj.model import load_scene
 from epuck_mj.motors import wheel_speeds
 from epuck_mj.sensors import proximity
 from epuck_mj.simulation import SimulatedRobots
@@ -297,7 +298,7 @@ def test_what_makes_no_sense_is_refused():
         "calibration: {proximity_gains: [.nan, 1, 1, 1, 1, 1, 1, 1]}": "got nan",
         "calibration: [1, 2]": "expected keys of proximity_gains, wheel_radii, track",
         "calibration: {wheel_radii: 0.02}": "expected 2 wheel_radii, got 0.02",
-        "calibration: no.yaml": "^test: calibration: cannot read calibration 'no.yaml'",
+        "calibration: no.yaml": "^test: calibration: cannot read 'no.yaml'",
     }.items():
         text = f"{{{keys}, optimizer: {{algorithm: random_search}}}}"
         with pytest.raises(UserError, match=message) as caught:

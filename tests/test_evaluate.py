@@ -13,7 +13,8 @@ from epuck_mj.controller_file import load
 from epuck_mj.errors import UserError
 from epuck_mj.files import read_arrays
 from epuck_mj.model import load_scene
-from evolution.config import ExperimentConfig, find_config, load_config
+from evolution.config import ExperimentConfig
+from evolution.config_files import find_config, load_config
 from evolution.evaluate import evaluate
 from evolution.execution import Means, Run
 from evolution.held_out import Judge
@@ -219,7 +220,7 @@ def test_a_robot_that_was_measured(finished, tmp_path):
         (*options, *own, "--randomise"): "expected randomise or calibration, got both",
         (*options, "--json", str(tmp_path)): "cannot write .* it is a folder",
         (*options, "--json", "no/out.json"): "cannot write .*no folder 'no'",
-        (*options, "--calibration", "no.yaml"): "cannot read calibration 'no.yaml'",
+        (*options, "--calibration", "no.yaml"): "cannot read 'no.yaml'",
     }.items():
         with pytest.raises(UserError, match=message):
             evaluate(list(wrong))

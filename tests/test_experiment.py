@@ -11,7 +11,8 @@ from epuck_mj.errors import UserError
 from epuck_mj.sensors import observe
 from epuck_mj.simulation import SimulatedRobots
 from evolution.champion import starts_for_test, starts_for_validation
-from evolution.config import ExperimentConfig, find_config, load_config
+from evolution.config import ExperimentConfig
+from evolution.config_files import find_config, load_config
 from evolution.experiment import (
     HISTORY,
     Experiment,

@@ -6,7 +6,9 @@ import pytest
 
 from epuck_mj import constants as c
 from epuck_mj.errors import UserError
-from epuck_mj.model import MODELS, PROXIMITY, load_scene
+from epuck_mj.interface import PROXIMITY
+from epuck_mj.mjcf import MODELS
+from epuck_mj.model import load_scene
 
 
 def whole_body(model) -> tuple[float, np.ndarray, np.ndarray]:

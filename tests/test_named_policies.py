@@ -12,7 +12,8 @@ from epuck_mj.controller import Network
 from epuck_mj.controller_file import ControllerFile, Origin
 from epuck_mj.errors import UserError
 from epuck_mj.wall_follower import WallFollower
-from evolution.config import ExperimentConfig, find_config, load_config
+from evolution.config import ExperimentConfig
+from evolution.config_files import find_config, load_config
 from evolution.execution import Means, Run
 from evolution.named_policies import NamedPolicy, described, named_policies
 from evolution.replay.trials import labels

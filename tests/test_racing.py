@@ -18,7 +18,8 @@ from epuck_mj.starts import FreeSpace
 from epuck_mj.trajectory import record
 from evolution import champion, evaluation
 from evolution.champion import choose_champion
-from evolution.config import ExperimentConfig, find_config, load_config
+from evolution.config import ExperimentConfig
+from evolution.config_files import find_config, load_config
 from evolution.evaluation import ROUNDING, BatchEngine, Race, evaluate
 from evolution.experiment import Experiment
 from tests.shipped import OPTIMIZERS

@@ -17,7 +17,8 @@ from epuck_mj.control import TaskParameters
 from epuck_mj.controller import Network
 from epuck_mj.errors import UserError
 from epuck_mj.geometry import drawn
-from epuck_mj.model import PROXIMITY, load_scene
+from epuck_mj.interface import PROXIMITY
+from epuck_mj.model import load_scene
 from epuck_mj.phases import PHASES, phases
 from epuck_mj.recording import Trial, save_recording
 from epuck_mj.recording.entities import entities

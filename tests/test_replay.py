@@ -17,7 +17,8 @@ from epuck_mj.model import load_scene
 from epuck_mj.starts import FreeSpace
 from epuck_mj.trajectory import Trajectory, record
 from evolution.champion import starts_for_test, starts_for_validation
-from evolution.config import ExperimentConfig, find_config, load_config
+from evolution.config import ExperimentConfig
+from evolution.config_files import find_config, load_config
 from evolution.replay import command, viewer
 from evolution.replay.command import replay
 

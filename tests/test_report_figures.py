@@ -17,7 +17,7 @@ from epuck_mj.control import TaskParameters
 from epuck_mj.controller import Network
 from epuck_mj.controller_file import ControllerFile, Origin
 from epuck_mj.errors import UserError
-from evolution.config import find_config, load_config
+from evolution.config_files import find_config, load_config
 from evolution.report.figures import FIGURES, figures, save
 from evolution.report.figures.behaviour import (
     CLASS_LOOKS,

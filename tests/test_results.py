@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.publish import shipped, with_tables
-from epuck_mj.model import MODELS
+from epuck_mj.mjcf import MODELS
 from evolution.study_config import StudyConfig, find_study
 from evolution.study_data import load_study
 from evolution.verify import verify

@@ -25,10 +25,11 @@ from rerun.chunk import RrdReader
 from epuck_mj import controller_file, files
 from epuck_mj.calibration import Calibration
 from epuck_mj.errors import UserError
-from epuck_mj.model import MODELS
+from epuck_mj.mjcf import MODELS
 from epuck_mj.trajectory import Trajectory
 from evolution import champion, execution, results
-from evolution.config import CONFIGS, ExperimentConfig, find_config, load_config
+from evolution.config import ExperimentConfig
+from evolution.config_files import CONFIGS, find_config, load_config
 from evolution.experiment import HISTORY
 from evolution.held_out import Judge
 from evolution.run import run

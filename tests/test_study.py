@@ -20,7 +20,7 @@ from epuck_mj import files
 from epuck_mj.errors import UserError
 from evolution import champion, execution, jobs, results
 from evolution import study as module
-from evolution.config import load_config
+from evolution.config_files import load_config
 from evolution.execution import Means
 from evolution.held_out import Judge
 from evolution.jobs import Event, Job, carry_out, failure_log, failure_of

@@ -10,8 +10,8 @@ import yaml
 
 from epuck_mj import files
 from epuck_mj.errors import UserError
-from epuck_mj.model import MODELS
-from evolution.config import find_config, load_config
+from epuck_mj.mjcf import MODELS
+from evolution.config_files import find_config, load_config
 from evolution.run_directory import locked
 from evolution.study_config import StudyConfig, find_study, parse_seeds
 from evolution.study_directory import StudyDirectory

@@ -15,7 +15,8 @@ from epuck_mj.control import TaskParameters
 from epuck_mj.controller import Network
 from epuck_mj.controller_file import ControllerFile, Origin
 from epuck_mj.errors import UserError
-from epuck_mj.model import MODELS, load_scene
+from epuck_mj.mjcf import MODELS
+from epuck_mj.model import load_scene
 from epuck_mj.starts import FreeSpace
 from epuck_mj.trajectory import record
 from epuck_mj.wall_follower import WallFollower
@@ -131,7 +132,7 @@ def test_bad_input_and_no_display_are_one_line_and_status_2(champion):
         (("arena",), "cannot open a window"),
         (("arena", champion, "--pose", 0, 0, 90), "cannot open a window"),
         (("moon",), "no arena 'moon'"),
-        (("arena", "none.json"), "cannot read controller"),
+        (("arena", "none.json"), "cannot read"),
         (("arena", champion, "--robot", "r2d2"), "no robot 'r2d2'"),
         (("arena", "--pose", "nan", 0, 0), "--pose"),
         (("arena", "--seconds", 0), "--seconds"),

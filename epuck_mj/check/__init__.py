@@ -18,7 +18,8 @@ from epuck_mj.check.source import TOPIC, Source, compiled, read
 from epuck_mj.check.speed import speed_findings
 from epuck_mj.check.walls import finite_findings, plane_findings, wall_findings
 from epuck_mj.errors import UserError
-from epuck_mj.model import Scene, find_arena, find_robot, load_scene
+from epuck_mj.mjcf import find_arena, find_robot
+from epuck_mj.model import Scene, load_scene
 from epuck_mj.starts import FreeSpace, Grid, survey
 from epuck_mj.tasks import START_CLEARANCE
 

@@ -13,7 +13,7 @@ import tyro
 from epuck_mj.check import check_arena, report
 from epuck_mj.check.picture import region_figure
 from epuck_mj.command_line import main, parse
-from epuck_mj.model import SHIPPED_ROBOTS
+from epuck_mj.mjcf import SHIPPED_ROBOTS
 from epuck_mj.pictures import save_figure
 
 

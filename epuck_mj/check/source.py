@@ -15,8 +15,9 @@ import mujoco
 
 from epuck_mj.check.findings import Place, Unusable, error
 from epuck_mj.errors import UserError
-from epuck_mj.files import is_file
-from epuck_mj.model import ADDED_ROBOT, ROBOT_BODY, SHIPPED_ROBOTS, with_robot
+from epuck_mj.files import is_file, read_text
+from epuck_mj.interface import ROBOT_BODY
+from epuck_mj.mjcf import ADDED_ROBOT, SHIPPED_ROBOTS, with_robot
 
 TOPIC = "file"
 
@@ -172,10 +173,7 @@ def _shown(tag: str, attributes: Mapping[str, str]) -> str:
 
 
 def _bytes(path: Path) -> bytes:
-    try:
-        return path.read_text(encoding="utf-8").encode()
-    except (OSError, UnicodeDecodeError) as problem:
-        raise UserError(f"cannot read '{path}': {problem}") from None
+    return read_text(path).encode()
 
 
 def _included(element: Element, arena: Path) -> str:

@@ -15,7 +15,8 @@ from epuck_mj.check.findings import Finding, Place, error, info, warning
 from epuck_mj.clearance import CONVEX
 from epuck_mj.constants import PROXIMITY_RANGE
 from epuck_mj.geometry import box_around, kinematics, walls
-from epuck_mj.model import ROBOT_BODY, SHELL, Scene, can_touch, static
+from epuck_mj.interface import ROBOT_BODY, SHELL, can_touch, static
+from epuck_mj.model import Scene
 from epuck_mj.tasks import START_CLEARANCE
 
 TOPIC = "walls"

@@ -20,7 +20,7 @@ import rerun as rr
 from epuck_mj.clearance import ClearanceProbe
 from epuck_mj.control import TaskParameters
 from epuck_mj.errors import UserError
-from epuck_mj.files import write_bytes
+from epuck_mj.files import write_bytes, writing
 from epuck_mj.model import Scene
 from epuck_mj.recording.blueprint import blueprint
 from epuck_mj.recording.entities import APPLICATION, Entities, entities
@@ -82,10 +82,8 @@ def save_recording(
     # rerun only warns when it is switched off
     if not content:
         raise UserError(f"cannot write '{path}': rerun is off, see RERUN")
-    try:
+    with writing(Path(path)):
         write_bytes(Path(path), content)
-    except OSError as error:
-        raise UserError(f"cannot write '{path}': {error.strerror}") from None
 
 
 def _log_trial(

@@ -12,7 +12,8 @@ import rerun.blueprint as rrb
 
 from epuck_mj.colors import BLUE, HIGH_FITNESS, LOW_FITNESS, VERMILION, blend
 from epuck_mj.geometry import kinematics, moving_bodies
-from epuck_mj.model import ROBOT_BODY, Scene
+from epuck_mj.interface import ROBOT_BODY
+from epuck_mj.model import Scene
 from epuck_mj.recording.blueprint import arena_view, plot
 from epuck_mj.recording.entities import APPLICATION, Entities
 from epuck_mj.recording.motion import MARK_HEIGHT, PATH_HEIGHT

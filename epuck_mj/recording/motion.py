@@ -6,7 +6,8 @@ import rerun as rr
 from epuck_mj.colors import FAINT, HIGH_FITNESS, LOW_FITNESS, VERMILION, blend
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.geometry import kinematics, moving_bodies
-from epuck_mj.model import ROBOT_BODY, Scene
+from epuck_mj.interface import ROBOT_BODY
+from epuck_mj.model import Scene
 from epuck_mj.recording.entities import EARNED, SENSED, Entities, columns
 from epuck_mj.recording.shapes import body_name
 from epuck_mj.trajectory import Trajectory

@@ -5,7 +5,7 @@ import numpy as np
 import rerun as rr
 
 from epuck_mj.geometry import arena_box, color, drawn, moving_bodies
-from epuck_mj.model import ROBOT_BODY
+from epuck_mj.interface import ROBOT_BODY
 from epuck_mj.recording.entities import ARENA, Entities
 
 FLOOR_THICKNESS = 0.002

@@ -16,7 +16,7 @@ from epuck_mj.colors import (
     VERMILION,
     YELLOW,
 )
-from epuck_mj.model import PROXIMITY
+from epuck_mj.interface import PROXIMITY
 from epuck_mj.phases import CORNERING, CRASHED, FOLLOWING, SEARCHING, phases
 from epuck_mj.recording.entities import (
     DECIDED,

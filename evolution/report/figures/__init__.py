@@ -8,8 +8,7 @@ from types import MappingProxyType
 import matplotlib
 from matplotlib.figure import Figure
 
-from epuck_mj.errors import UserError
-from epuck_mj.files import write_bytes
+from epuck_mj.files import write_bytes, writing
 from evolution.report.figures.behaviour import behaviour, trajectories
 from evolution.report.figures.champions import held_out, rungs, stored_and_held_out
 from evolution.report.figures.curves import fitness, fitness_all, targets
@@ -74,7 +73,5 @@ def save(figure: Figure, folder: Path, name: str) -> None:
         with matplotlib.rc_context(PRINT):
             figure.savefig(content, format=form, dpi=200, metadata=dict(metadata))
         path = folder / f"{name}.{form}"
-        try:
+        with writing(path):
             write_bytes(path, content.getvalue())
-        except OSError as error:
-            raise UserError(f"cannot write '{path}': {error.strerror}") from None

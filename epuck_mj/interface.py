@@ -1,0 +1,97 @@
+"""What every robot and every arena must have, by MuJoCo's names.
+
+Robots differ in their base and nothing else.
+"""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from epuck_mj.constants import N_PROXIMITY
+from epuck_mj.errors import UserError
+
+ROBOT_BODY = "epuck"
+SHELL = "shell"
+WHEELS = ("wheel_left", "wheel_right")
+PROXIMITY = tuple(f"ps{i}" for i in range(N_PROXIMITY))
+
+_JOINT, _SENSOR = mujoco.mjtJoint, mujoco.mjtSensor
+
+
+def check_base(model: mujoco.MjModel, robot: Path) -> None:
+    """Refuse a base on which no pose can be set."""
+    body = index_of(model, mujoco.mjtObj.mjOBJ_BODY, ROBOT_BODY, robot)
+    first, count = model.body_jntadr[body], model.body_jntnum[body]
+    types = tuple(model.jnt_type[first : first + count])
+    planar = (_JOINT.mjJNT_SLIDE, _JOINT.mjJNT_SLIDE, _JOINT.mjJNT_HINGE)
+    axes = model.jnt_axis[first : first + count]
+    at_origin = not model.body_pos[body, :2].any()
+    if types == (_JOINT.mjJNT_FREE,):
+        return
+    if types == planar and np.array_equal(axes, np.eye(3)) and at_origin:
+        return
+    raise UserError(
+        f"robot '{robot}': expected body '{ROBOT_BODY}' at the origin with a free "
+        "joint or with slides along x and y and a hinge about z"
+    )
+
+
+def check_floor(model: mujoco.MjModel, arena: Path) -> None:
+    """Refuse a floor that the shell would hit, and wheels with nothing to drive on."""
+    shell, ground = model.geom(SHELL).id, static(model)
+    planes = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
+    for geom in np.flatnonzero(ground & planes & can_touch(model, shell)).tolist():
+        raise UserError(
+            f"arena '{arena}': the robot's shell would hit the plane "
+            f"'{model.geom(geom).name or geom}'; expected a floor with "
+            'contype="2" conaffinity="2", which wheels meet and shells do not'
+        )
+    base = model.body_jntadr[model.body(ROBOT_BODY).id]
+    if model.jnt_type[base] != _JOINT.mjJNT_FREE:
+        return
+    others = (geom for geom in np.flatnonzero(~ground).tolist() if geom != shell)
+    if not any((ground & can_touch(model, geom)).any() for geom in others):
+        raise UserError(
+            f"arena '{arena}' has no floor for the robot's wheels: expected a plane "
+            'with contype="2" conaffinity="2"'
+        )
+
+
+def static(model: mujoco.MjModel) -> np.ndarray:
+    """Which geoms are fixed to the world, `(ngeom,)`."""
+    return model.body_weldid[model.geom_bodyid] == 0
+
+
+def can_touch(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """Which geoms a geom can touch, by their collision bits, `(ngeom,)`."""
+    bits, masks = model.geom_contype, model.geom_conaffinity
+    return ((bits[geom] & masks) | (bits & masks[geom])) != 0
+
+
+def sensor_address(model: mujoco.MjModel, name: str, kind: int, robot: Path) -> int:
+    """Address of a sensor of that kind in sensordata."""
+    sensor = index_of(model, mujoco.mjtObj.mjOBJ_SENSOR, name, robot)
+    if model.sensor_type[sensor] != kind:
+        raise UserError(
+            f"robot '{robot}': expected sensor '{name}' to be a "
+            f"{_SENSOR(kind).name.removeprefix('mjSENS_').lower()}"
+        )
+    return int(model.sensor_adr[sensor])
+
+
+def index_of(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, robot: Path) -> int:
+    """Index of a named part of the robot."""
+    index = mujoco.mj_name2id(model, kind.value, name)
+    if index >= 0:
+        return index
+    label = kind.name.removeprefix("mjOBJ_").lower()
+    count = {
+        "body": model.nbody,
+        "geom": model.ngeom,
+        "actuator": model.nu,
+        "sensor": model.nsensor,
+    }[label]
+    names = [mujoco.mj_id2name(model, kind.value, i) or "" for i in range(count)]
+    available = ", ".join(filter(None, names)) or "none"
+    raise UserError(f"robot '{robot}' has no {label} '{name}'; available: {available}")
