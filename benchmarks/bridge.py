@@ -21,9 +21,10 @@ import tyro
 from epuck_mj.bridge.builds import BUILDS
 from epuck_mj.bridge.fake.body import Journal
 from epuck_mj.bridge.fake.reference import deviation, nominal, same_times
-from epuck_mj.bridge.link import Link, SerialPort
+from epuck_mj.bridge.link import Link
 from epuck_mj.bridge.robot import RealRobot
 from epuck_mj.bridge.serial_line import SerialLine
+from epuck_mj.bridge.serial_port import SerialPort
 from epuck_mj.bridge.session import Session
 from epuck_mj.calibration import Calibration
 from epuck_mj.control import Policy, TaskParameters

@@ -60,7 +60,7 @@ ALLOWED_IN = {
     "dask": "evolution/cluster/",
     "distributed": "evolution/cluster/",
     "rerun": "epuck_mj/recording/",
-    "serial": "epuck_mj/bridge/link.py",
+    "serial": "epuck_mj/bridge/serial_port.py",
     "contourpy": "epuck_mj/wall_loops.py",
     "imageio_ffmpeg": "epuck_mj/video.py",
     "matplotlib": (

@@ -19,9 +19,10 @@ from epuck_mj.bridge.fake.body import MujocoBody
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Endpoint, Pty, Tcp, serve
 from epuck_mj.bridge.fake.scenarios import scenario
-from epuck_mj.bridge.link import Link, SerialPort
+from epuck_mj.bridge.link import Link
 from epuck_mj.bridge.protocol import RESYNC, Steps, ascii
 from epuck_mj.bridge.serial_line import SerialLine
+from epuck_mj.bridge.serial_port import SerialPort
 from epuck_mj.constants import TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.files import read_arrays

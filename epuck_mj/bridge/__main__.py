@@ -9,9 +9,9 @@ from pathlib import Path
 import tyro
 
 from epuck_mj.bridge.connect import connect
-from epuck_mj.bridge.link import ports
 from epuck_mj.bridge.log import log_name
 from epuck_mj.bridge.mission import Mission, accomplish
+from epuck_mj.bridge.serial_port import ports
 from epuck_mj.calibration import Calibration
 from epuck_mj.command_line import main, parse
 from epuck_mj.constants import SPEED_MAX

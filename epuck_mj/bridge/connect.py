@@ -3,9 +3,10 @@
 from urllib.parse import urlsplit
 
 from epuck_mj.bridge.connection import Connection
-from epuck_mj.bridge.link import Link, SerialPort
+from epuck_mj.bridge.link import Link
 from epuck_mj.bridge.protocol import RESYNC, ascii, packets
 from epuck_mj.bridge.serial_line import SerialLine
+from epuck_mj.bridge.serial_port import SerialPort
 from epuck_mj.bridge.wifi_line import WifiLine
 from epuck_mj.constants import WIFI_PORT
 from epuck_mj.errors import UserError
