@@ -1,4 +1,4 @@
-"""The rules of ask and tell that every optimiser shares: space, misuse, NaN, state.
+"""The rules of ask and tell that every optimiser shares: misuse, NaN, state.
 
 One generation is ``genomes = ask()``, an evaluation by the caller, ``tell(fitness)``.
 An optimiser remembers what it asked and refuses every other order of calls. Its state
@@ -7,8 +7,8 @@ is defined between generations only, as plain arrays that ``np.savez`` writes an
 """
 
 import json
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
@@ -17,69 +17,6 @@ from numpy.typing import ArrayLike
 
 class AskTellError(RuntimeError):
     """An optimiser was called out of turn or told a fitness of the wrong shape."""
-
-
-@dataclass(frozen=True)
-class SearchSpace:
-    """A box of genomes `(genes,)`, with the box in which the search begins.
-
-    Attributes:
-        genes: length of a genome.
-        lower: smallest allowed value, the same for every gene.
-        upper: largest allowed value, the same for every gene.
-        init_lower: lower end of the initial uniform population.
-        init_upper: upper end of the initial uniform population.
-
-    Raises:
-        ValueError: no genes, an empty or infinite box, or a beginning outside of it.
-    """
-
-    genes: int
-    lower: float
-    upper: float
-    init_lower: float
-    init_upper: float
-
-    def __post_init__(self) -> None:
-        """Refuse a box that cannot be searched."""
-        if self.genes < 1:
-            raise ValueError(f"expected at least 1 gene, got {self.genes}")
-        if not -np.inf < self.lower < self.upper < np.inf:
-            raise ValueError(
-                f"expected finite bounds, lower < upper, got {self.lower}, {self.upper}"
-            )
-        if not self.lower <= self.init_lower <= self.init_upper <= self.upper:
-            raise ValueError(
-                f"expected an initial range inside [{self.lower}, {self.upper}], "
-                f"got [{self.init_lower}, {self.init_upper}]"
-            )
-
-
-def refuse_pending(asked: np.ndarray | None, action: str) -> None:
-    """Nothing, unless genomes wait for their fitness.
-
-    Args:
-        asked: what the last ask proposed, None if it has been told.
-        action: what the caller is about to do, for the message.
-
-    Raises:
-        AskTellError: `asked` has not been told.
-    """
-    if asked is not None:
-        raise AskTellError(
-            f"cannot {action}: expected tell() with {len(asked)} fitness values first"
-        )
-
-
-def pending(asked: np.ndarray | None) -> np.ndarray:
-    """The genomes or chromosomes `(n, ...)` that wait for their fitness.
-
-    Raises:
-        AskTellError: there are none.
-    """
-    if asked is None:
-        raise AskTellError("nothing to tell: expected ask() first")
-    return asked
 
 
 def checked_fitness(fitness: ArrayLike, n_asked: int) -> np.ndarray:
@@ -164,23 +101,11 @@ def checked_state(
     return arrays
 
 
-def refuse_wide_steps(sigma: float, space: SearchSpace) -> None:
-    """Nothing, unless steps are wider than the bounds.
+class AskTell(ABC):
+    """An `Optimizer`, whose members are documented there, but for its algorithm.
 
-    Raises:
-        ValueError: `sigma` exceeds their width.
-    """
-    width = space.upper - space.lower
-    if sigma > width:
-        raise ValueError(
-            f"sigma: expected at most {width}, the width of the bounds, got {sigma}"
-        )
-
-
-class Survivors:
-    """What optimisers share whose population are genomes with their stored fitness.
-
-    The attributes are those of `Optimizer`.
+    An algorithm says how the first population is drawn, what is asked after it, what is
+    learnt from what is told, and which arrays all that depends on.
     """
 
     def __init__(self, name: str, population: np.ndarray, rng: Generator) -> None:
@@ -192,21 +117,60 @@ class Survivors:
         self.fitness = read_only(np.full(len(population), -np.inf))
         self.generation = 0
 
+    @abstractmethod
+    def _propose(self) -> np.ndarray:
+        """Genomes of the next generation, of every one but the first, `(n, genes)`."""
+
+    @abstractmethod
+    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+        """Make of the population and its fitness what they are after a generation.
+
+        Args:
+            asked: its genomes `(n, genes)`; the first population in generation 0.
+            told: their fitness `(n,)`, NaN made -inf.
+        """
+
+    def next_size(self) -> int:
+        """See `Optimizer.next_size`."""
+        return len(self.population)
+
+    def ask(self) -> np.ndarray:
+        """See `Optimizer.ask`."""
+        self._refuse_pending("ask")
+        self._asked = self._propose() if self.generation else self.population
+        return self._asked.copy()
+
+    def to_beat(self) -> np.ndarray:
+        """See `Optimizer.to_beat`: here, every fitness matters."""
+        return np.full(len(self._pending()), -np.inf)
+
+    def tell(self, fitness: ArrayLike) -> None:
+        """See `Optimizer.tell`."""
+        asked = self._pending()
+        self._learn(asked, checked_fitness(fitness, len(asked)))
+        self.generation += 1
+        self._asked = None
+
     def state(self) -> dict[str, np.ndarray]:
-        """Everything the next generations depend on; see `Optimizer.state`."""
-        refuse_pending(self._asked, "take the state")
+        """See `Optimizer.state`."""
+        self._refuse_pending("take the state")
         return self._arrays()
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
-        """Go on where `state` was taken; see `Optimizer.restore`."""
+        """See `Optimizer.restore`."""
         arrays = checked_state(state, like=self._arrays())
         self._rng = restored_generator(self._rng, arrays["generator"])
-        self.population = read_only(arrays["population"])
-        self.fitness = read_only(arrays["fitness"])
         self.generation = int(arrays["generation"])
         self._asked = None
+        self._load(arrays)
+
+    def _load(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Take over what an algorithm adds to the state, and the population."""
+        self.population = read_only(arrays["population"])
+        self.fitness = read_only(arrays["fitness"])
 
     def _arrays(self) -> dict[str, np.ndarray]:
+        """The state."""
         return {
             "name": np.array(self.name),
             "generation": np.array(self.generation),
@@ -214,3 +178,25 @@ class Survivors:
             "fitness": self.fitness.copy(),
             "generator": generator_state(self._rng),
         }
+
+    def _pending(self) -> np.ndarray:
+        """The genomes `(n, genes)` that wait for their fitness.
+
+        Raises:
+            AskTellError: there are none.
+        """
+        if self._asked is None:
+            raise AskTellError("nothing to tell: expected ask() first")
+        return self._asked
+
+    def _refuse_pending(self, action: str) -> None:
+        """Nothing, unless genomes wait for their fitness.
+
+        Raises:
+            AskTellError: they do; says what cannot be done.
+        """
+        if self._asked is not None:
+            raise AskTellError(
+                f"cannot {action}: expected tell() with {len(self._asked)} fitness "
+                "values first"
+            )

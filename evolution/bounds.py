@@ -60,3 +60,14 @@ BOUNDS_RULES: Mapping[str, BoundsRule] = {
     "reflect": reflect,
     "reinit": reinit,
 }
+
+
+def check_bounds_rule(name: str) -> None:
+    """Nothing, if there is a rule of that name.
+
+    Raises:
+        ValueError: there is none.
+    """
+    if name not in BOUNDS_RULES:
+        available = ", ".join(BOUNDS_RULES)
+        raise ValueError(f"unknown bounds rule {name!r}; available: {available}")

@@ -21,19 +21,15 @@ from typing import ClassVar, Literal
 import numpy as np
 from cmaes import CMA
 from numpy.random import Generator
-from numpy.typing import ArrayLike
 
 from evolution.ask_tell import (
-    SearchSpace,
-    checked_fitness,
+    AskTell,
     checked_state,
     generator_state,
-    pending,
     read_only,
-    refuse_pending,
-    refuse_wide_steps,
     restored_generator,
 )
+from evolution.search_space import SearchSpace, refuse_wide_steps
 
 # With a single parent, half of 3, `cmaes` divides by a learning rate of 0.
 MIN_POPULATION = 4
@@ -86,7 +82,7 @@ class CmaEsParameters:
             raise ValueError(f"sigma: expected a number above 0, got {self.sigma}")
 
 
-class CmaEs:
+class CmaEs(AskTell):
     """An `Optimizer`, 'cma-es', whose attributes are documented there.
 
     Its population are the individuals last told, good or bad; it grows at a restart.
@@ -107,64 +103,29 @@ class CmaEs:
         # What the whole search follows from, together with what will be told.
         self._birth = generator_state(rng)
         self._told = [np.empty(0)]
-        self._asked: np.ndarray | None = None
         self._cma = self._started(parameters.population)
-        self.name = "cma-es"
-        self.population = read_only(self._drawn())
-        self.fitness = read_only(np.full(parameters.population, -np.inf))
-        self.generation = 0
+        super().__init__("cma-es", self._drawn(), rng)
 
     def next_size(self) -> int:
-        """Number of genomes the next ask returns."""
+        """See `Optimizer.next_size`."""
         return self._cma.population_size
 
-    def ask(self) -> np.ndarray:
-        """Genomes to evaluate `(next_size(), genes)`, the caller's to keep.
+    def _propose(self) -> np.ndarray:
+        """What the present search draws next."""
+        return self._drawn()
 
-        Raises:
-            AskTellError: the last genomes have not been told.
-        """
-        refuse_pending(self._asked, "ask")
-        self._asked = self.population if self.generation == 0 else self._drawn()
-        return self._asked.copy()
-
-    def to_beat(self) -> np.ndarray:
-        """-inf `(n,)`: the whole generation is ranked.
-
-        Raises:
-            AskTellError: nothing was asked.
-        """
-        return np.full(len(pending(self._asked)), -np.inf)
-
-    def tell(self, fitness: ArrayLike) -> None:
-        """Make the generation asked the current one; start again if it is time.
-
-        Args:
-            fitness: of the genomes asked, in their order `(n,)`; NaN counts as -inf.
-
-        Raises:
-            AskTellError: nothing was asked, or another shape was expected.
-        """
-        asked = pending(self._asked)
-        told = checked_fitness(fitness, len(asked))
-        # It minimises.
+    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+        """Make the generation asked the current one; start again if it is time."""
+        # it minimises
         costs = (-made_finite(told)).tolist()
         self._cma.tell(list(zip(asked, costs, strict=True)))
         if self._parameters.restarts and self._cma.should_stop():
             self._cma = self._started(2 * self._cma.population_size)
         self._told.append(told)
-        self.population = read_only(asked)
-        self.fitness = read_only(told)
-        self.generation += 1
-        self._asked = None
-
-    def state(self) -> dict[str, np.ndarray]:
-        """Everything the next generations depend on; see `Optimizer.state`."""
-        refuse_pending(self._asked, "take the state")
-        return self._arrays()
+        self.population, self.fitness = read_only(asked), read_only(told)
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
-        """Go on where `state` was taken; see `Optimizer.restore`.
+        """See `Optimizer.restore`.
 
         Takes as long as all asks and tells up to there. What was told must also fill
         whole generations, and as many as there were.

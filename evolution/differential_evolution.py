@@ -17,17 +17,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike
 
-from evolution.ask_tell import (
-    SearchSpace,
-    Survivors,
-    checked_fitness,
-    pending,
-    read_only,
-    refuse_pending,
-)
-from evolution.bounds import BOUNDS_RULES
+from evolution.ask_tell import AskTell, read_only
+from evolution.bounds import BOUNDS_RULES, check_bounds_rule
+from evolution.search_space import SearchSpace
 
 # i and three more, all distinct; both strategies draw the same three.
 MIN_POPULATION = 4
@@ -131,14 +124,10 @@ class DifferentialEvolutionParameters:
             raise ValueError(f"scale (F): expected 0 to 2, got {self.scale}")
         if not 0 <= self.crossover <= 1:
             raise ValueError(f"crossover (CR): expected 0 to 1, got {self.crossover}")
-        if self.bounds_rule not in BOUNDS_RULES:
-            raise ValueError(
-                f"unknown bounds rule {self.bounds_rule!r}; "
-                f"available: {', '.join(BOUNDS_RULES)}"
-            )
+        check_bounds_rule(self.bounds_rule)
 
 
-class DifferentialEvolution(Survivors):
+class DifferentialEvolution(AskTell):
     """An `Optimizer`, 'de-best' or 'de-rand', whose attributes are documented there.
 
     Its population are the survivors. Without `reevaluate_parents` their stored fitness
@@ -159,69 +148,42 @@ class DifferentialEvolution(Survivors):
         self._space = space
 
     def next_size(self) -> int:
-        """Number of genomes the next ask returns."""
-        reevaluated = self._parameters.reevaluate_parents and self.generation > 0
-        return self._parameters.population * (2 if reevaluated else 1)
-
-    def ask(self) -> np.ndarray:
-        """Genomes to evaluate `(next_size(), genes)`, the caller's to keep.
-
-        The initial population; later the trials, after their parents if those are
-        re-evaluated.
-
-        Raises:
-            AskTellError: the last genomes have not been told.
-        """
-        refuse_pending(self._asked, "ask")
-        if self.generation == 0:
-            asked = self.population
-        elif self._parameters.reevaluate_parents:
-            asked = np.concatenate([self.population, self._trials()])
-        else:
-            asked = self._trials()
-        self._asked = asked
-        return asked.copy()
+        """See `Optimizer.next_size`."""
+        return len(self.population) * (2 if self._reevaluates() else 1)
 
     def to_beat(self) -> np.ndarray:
-        """Fitness `(n,)` to exceed: a trial that does not beat its parent is forgotten.
+        """See `Optimizer.to_beat`: a trial that does not beat its parent is forgotten.
 
         Without a limit in the initial population and where parents are re-evaluated,
         which changes what is to be beaten.
-
-        Raises:
-            AskTellError: nothing was asked.
         """
-        asked = pending(self._asked)
-        if self.generation == 0 or self._parameters.reevaluate_parents:
+        asked = self._pending()
+        if self._reevaluates():
             return np.full(len(asked), -np.inf)
         return self.fitness.copy()
 
-    def tell(self, fitness: ArrayLike) -> None:
-        """Let each trial replace its parent if it is strictly better.
+    def _reevaluates(self) -> bool:
+        """Whether this generation asks parents and trials together."""
+        return self._parameters.reevaluate_parents and self.generation > 0
 
-        Args:
-            fitness: of the genomes asked, in their order `(n,)`; NaN counts as -inf.
+    def _propose(self) -> np.ndarray:
+        """The trials, after their parents if those are re-evaluated."""
+        trials = self._trials()
+        if self._reevaluates():
+            return np.concatenate([self.population, trials])
+        return trials
 
-        Raises:
-            AskTellError: nothing was asked, or another shape was expected.
-        """
-        asked = pending(self._asked)
-        told = checked_fitness(fitness, len(asked))
-        n = self._parameters.population
-        if self.generation == 0:
-            self.fitness = read_only(told)
-        else:
-            # Survivors carry the fitness they were compared with.
-            reevaluated = self._parameters.reevaluate_parents
-            parent_fitness = told[:n] if reevaluated else self.fitness
-            trials, trial_fitness = asked[-n:], told[-n:]
-            accepted = trial_fitness > parent_fitness
-            self.population = read_only(
-                np.where(accepted[:, np.newaxis], trials, self.population)
-            )
-            self.fitness = read_only(np.where(accepted, trial_fitness, parent_fitness))
-        self.generation += 1
-        self._asked = None
+    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+        """Let each trial replace its parent if it is strictly better."""
+        n = len(self.population)
+        # survivors carry the fitness they were compared with, -inf at first
+        parent_fitness = told[:n] if self._reevaluates() else self.fitness
+        trials, trial_fitness = asked[-n:], told[-n:]
+        accepted = trial_fitness > parent_fitness
+        self.population = read_only(
+            np.where(accepted[:, np.newaxis], trials, self.population)
+        )
+        self.fitness = read_only(np.where(accepted, trial_fitness, parent_fitness))
 
     def _trials(self) -> np.ndarray:
         """One trial for each individual `(population, genes)`."""

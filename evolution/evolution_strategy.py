@@ -20,18 +20,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike
 
-from evolution.ask_tell import (
-    SearchSpace,
-    Survivors,
-    checked_fitness,
-    pending,
-    read_only,
-    refuse_pending,
-    refuse_wide_steps,
-)
-from evolution.bounds import BOUNDS_RULES
+from evolution.ask_tell import AskTell, read_only
+from evolution.bounds import BOUNDS_RULES, check_bounds_rule
+from evolution.search_space import SearchSpace, refuse_wide_steps
 
 ALPHA = np.exp(1 / 3)
 """What a success multiplies sigma with; four failures undo it."""
@@ -84,14 +76,10 @@ class EvolutionStrategyParameters:
             raise ValueError(f"lineages: expected at least 1, got {self.lineages}")
         if not 0 < self.sigma < np.inf:
             raise ValueError(f"sigma: expected a number above 0, got {self.sigma}")
-        if self.bounds_rule not in BOUNDS_RULES:
-            raise ValueError(
-                f"unknown bounds rule {self.bounds_rule!r}; "
-                f"available: {', '.join(BOUNDS_RULES)}"
-            )
+        check_bounds_rule(self.bounds_rule)
 
 
-class EvolutionStrategy(Survivors):
+class EvolutionStrategy(AskTell):
     """An `Optimizer`, 'one-plus-one-es', whose attributes are documented there.
 
     Its population are the parents. Their stored fitness is for ever the one that let
@@ -117,69 +105,38 @@ class EvolutionStrategy(Survivors):
         self._space = space
         self._sigma = np.full(parameters.lineages, parameters.sigma, dtype=np.float64)
 
-    def next_size(self) -> int:
-        """Number of genomes the next ask returns."""
-        return self._parameters.lineages
-
-    def ask(self) -> np.ndarray:
-        """Genomes to evaluate `(lineages, genes)`, the caller's to keep.
-
-        The first parents; later one offspring of each parent.
-
-        Raises:
-            AskTellError: the last genomes have not been told.
-        """
-        refuse_pending(self._asked, "ask")
-        self._asked = self.population if self.generation == 0 else self._offspring()
-        return self._asked.copy()
-
     def to_beat(self) -> np.ndarray:
-        """Fitness `(n,)` to exceed: the parents', which at first is -inf.
+        """See `Optimizer.to_beat`: the parents' fitness, which at first is -inf.
 
         Any other offspring is a failure, and by how much is forgotten.
-
-        Raises:
-            AskTellError: nothing was asked.
         """
-        pending(self._asked)
+        self._pending()
         return self.fitness.copy()
 
-    def tell(self, fitness: ArrayLike) -> None:
-        """Let each offspring replace its parent if it is strictly better; adapt sigma.
-
-        Args:
-            fitness: of the genomes asked, in their order `(n,)`; NaN counts as -inf.
-
-        Raises:
-            AskTellError: nothing was asked, or another shape was expected.
-        """
-        asked = pending(self._asked)
-        told = checked_fitness(fitness, len(asked))
-        if self.generation == 0:
-            self.fitness = read_only(told)
-        else:
-            success = told > self.fitness
-            self.population = read_only(
-                np.where(success[:, np.newaxis], asked, self.population)
-            )
-            self.fitness = read_only(np.where(success, told, self.fitness))
-            lower, upper = self._space.lower, self._space.upper
-            self._sigma = one_fifth_rule(self._sigma, success, lower, upper)
-        self.generation += 1
-        self._asked = None
-
-    def restore(self, state: Mapping[str, np.ndarray]) -> None:
-        """Go on where `state` was taken; see `Optimizer.restore`."""
-        super().restore(state)
-        self._sigma = np.array(state["sigma"])
-
-    def _arrays(self) -> dict[str, np.ndarray]:
-        return {**super()._arrays(), "sigma": self._sigma.copy()}
-
-    def _offspring(self) -> np.ndarray:
+    def _propose(self) -> np.ndarray:
         """One offspring of each parent `(lineages, genes)`."""
         parents, space, rng = self.population, self._space, self._rng
         steps = rng.standard_normal(parents.shape)
         offspring = parents + self._sigma[:, np.newaxis] * steps
         keep_inside = BOUNDS_RULES[self._parameters.bounds_rule]
         return keep_inside(offspring, parents, space.lower, space.upper, rng)
+
+    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+        """Let offspring replace their parents if strictly better; adapt sigma."""
+        if self.generation == 0:
+            self.fitness = read_only(told)
+            return
+        success = told > self.fitness
+        self.population = read_only(
+            np.where(success[:, np.newaxis], asked, self.population)
+        )
+        self.fitness = read_only(np.where(success, told, self.fitness))
+        lower, upper = self._space.lower, self._space.upper
+        self._sigma = one_fifth_rule(self._sigma, success, lower, upper)
+
+    def _load(self, arrays: Mapping[str, np.ndarray]) -> None:
+        super()._load(arrays)
+        self._sigma = arrays["sigma"]
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return {**super()._arrays(), "sigma": self._sigma.copy()}

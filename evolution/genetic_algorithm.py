@@ -17,18 +17,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike
 
-from evolution.ask_tell import (
-    SearchSpace,
-    checked_fitness,
-    checked_state,
-    generator_state,
-    pending,
-    read_only,
-    refuse_pending,
-    restored_generator,
-)
+from evolution.ask_tell import AskTell, read_only
+from evolution.search_space import SearchSpace
 
 # Levels of more bits are not worth a float64's 53 digits.
 MAX_BITS = 32
@@ -145,7 +136,7 @@ class GeneticAlgorithmParameters:
             )
 
 
-class GeneticAlgorithm:
+class GeneticAlgorithm(AskTell):
     """An `Optimizer`, 'ga', whose attributes are documented there.
 
     Its population are the individuals last told, good or bad.
@@ -174,81 +165,32 @@ class GeneticAlgorithm:
             )
         self._parameters = parameters
         self._space = space
-        self._rng = rng
-        self._asked: np.ndarray | None = None
         shape = (parameters.population, length)
         self._chromosomes = rng.integers(2, size=shape).astype(bool)
-        self.name = "ga"
-        self.population = read_only(self._decoded(self._chromosomes))
-        self.fitness = read_only(np.full(parameters.population, -np.inf))
-        self.generation = 0
+        # of what was asked
+        self._bred = self._chromosomes
+        super().__init__("ga", self._decoded(self._chromosomes), rng)
 
-    def next_size(self) -> int:
-        """Number of genomes the next ask returns."""
-        return self._parameters.population
+    def _propose(self) -> np.ndarray:
+        """Offspring of the generation last told, after its elites."""
+        self._bred = self._offspring()
+        return self._decoded(self._bred)
 
-    def ask(self) -> np.ndarray:
-        """Genomes to evaluate `(population, genes)`, the caller's to keep.
+    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+        """Make the generation asked the current one."""
+        self._chromosomes = self._bred
+        self.population, self.fitness = read_only(asked), read_only(told)
 
-        The initial population; later the offspring of the generation last told, after
-        its elites.
-
-        Raises:
-            AskTellError: the last genomes have not been told.
-        """
-        refuse_pending(self._asked, "ask")
-        asked = self._chromosomes if self.generation == 0 else self._offspring()
-        self._asked = asked
-        return self._decoded(asked)
-
-    def to_beat(self) -> np.ndarray:
-        """-inf `(n,)`: tournaments compare whatever fitness there is.
-
-        Raises:
-            AskTellError: nothing was asked.
-        """
-        return np.full(len(pending(self._asked)), -np.inf)
-
-    def tell(self, fitness: ArrayLike) -> None:
-        """Make the generation asked the current one.
-
-        Args:
-            fitness: of the genomes asked, in their order `(n,)`; NaN counts as -inf.
-
-        Raises:
-            AskTellError: nothing was asked, or another shape was expected.
-        """
-        asked = pending(self._asked)
-        told = checked_fitness(fitness, len(asked))
-        self._chromosomes = asked
-        self.population = read_only(self._decoded(asked))
-        self.fitness = read_only(told)
-        self.generation += 1
-        self._asked = None
-
-    def state(self) -> dict[str, np.ndarray]:
-        """Everything the next generations depend on; see `Optimizer.state`."""
-        refuse_pending(self._asked, "take the state")
-        return self._arrays()
-
-    def restore(self, state: Mapping[str, np.ndarray]) -> None:
-        """Go on where `state` was taken; see `Optimizer.restore`."""
-        arrays = checked_state(state, like=self._arrays())
-        self._rng = restored_generator(self._rng, arrays["generator"])
-        self._chromosomes = arrays["chromosomes"]
+    def _load(self, arrays: Mapping[str, np.ndarray]) -> None:
+        self._chromosomes = self._bred = arrays["chromosomes"]
         self.population = read_only(self._decoded(self._chromosomes))
         self.fitness = read_only(arrays["fitness"])
-        self.generation = int(arrays["generation"])
-        self._asked = None
 
     def _arrays(self) -> dict[str, np.ndarray]:
-        return {
-            "name": np.array(self.name),
-            "generation": np.array(self.generation),
-            "chromosomes": self._chromosomes.copy(),
-            "fitness": self.fitness.copy(),
-            "generator": generator_state(self._rng),
-        }
+        arrays = super()._arrays()
+        # of which the genomes follow
+        del arrays["population"]
+        return {**arrays, "chromosomes": self._chromosomes.copy()}
 
     def _decoded(self, chromosomes: np.ndarray) -> np.ndarray:
         bits, space = self._parameters.bits, self._space

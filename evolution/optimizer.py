@@ -18,7 +18,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike
 
-from evolution.ask_tell import AskTellError, SearchSpace
+from evolution.ask_tell import AskTellError
 from evolution.cma_es import CmaEs, CmaEsParameters
 from evolution.differential_evolution import (
     DifferentialEvolution,
@@ -27,6 +27,7 @@ from evolution.differential_evolution import (
 from evolution.evolution_strategy import EvolutionStrategy, EvolutionStrategyParameters
 from evolution.genetic_algorithm import GeneticAlgorithm, GeneticAlgorithmParameters
 from evolution.random_search import RandomSearch, RandomSearchParameters
+from evolution.search_space import SearchSpace
 
 __all__ = [
     "ALGORITHMS",

@@ -10,16 +10,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike
 
-from evolution.ask_tell import (
-    SearchSpace,
-    Survivors,
-    checked_fitness,
-    pending,
-    read_only,
-    refuse_pending,
-)
+from evolution.ask_tell import AskTell, read_only
+from evolution.search_space import SearchSpace
 
 
 def best_of(fitness: np.ndarray, n: int) -> np.ndarray:
@@ -56,7 +49,7 @@ class RandomSearchParameters:
             raise ValueError(f"population: expected at least 1, got {self.population}")
 
 
-class RandomSearch(Survivors):
+class RandomSearch(AskTell):
     """An `Optimizer`, 'random-search', whose attributes are documented there.
 
     Its population are the best individuals seen so far, the oldest first.
@@ -73,52 +66,23 @@ class RandomSearch(Survivors):
         self._space = space
         super().__init__("random-search", self._drawn(rng), rng)
 
-    def next_size(self) -> int:
-        """Number of genomes the next ask returns."""
-        return self._parameters.population
-
-    def ask(self) -> np.ndarray:
-        """Genomes to evaluate `(population, genes)`, the caller's to keep.
-
-        Raises:
-            AskTellError: the last genomes have not been told.
-        """
-        refuse_pending(self._asked, "ask")
-        self._asked = (
-            self.population if self.generation == 0 else self._drawn(self._rng)
-        )
-        return self._asked.copy()
-
     def to_beat(self) -> np.ndarray:
-        """Fitness `(n,)` to exceed: the lowest one kept, -inf at first.
+        """See `Optimizer.to_beat`: the lowest fitness kept, -inf at first."""
+        return np.full(len(self._pending()), self.fitness.min())
 
-        Raises:
-            AskTellError: nothing was asked.
-        """
-        # Before the first tell the stored fitness is -inf.
-        return np.full(len(pending(self._asked)), self.fitness.min())
+    def _propose(self) -> np.ndarray:
+        """Fresh genomes `(population, genes)`."""
+        return self._drawn(self._rng)
 
-    def tell(self, fitness: ArrayLike) -> None:
-        """Keep the best of those kept and those asked; of equals the older.
-
-        Args:
-            fitness: of the genomes asked, in their order `(n,)`; NaN counts as -inf.
-
-        Raises:
-            AskTellError: nothing was asked, or another shape was expected.
-        """
-        asked = pending(self._asked)
-        told = checked_fitness(fitness, len(asked))
+    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+        """Keep the best of those kept and those asked; of equals the older."""
         if self.generation == 0:
             self.fitness = read_only(told)
-        else:
-            seen = np.concatenate([self.population, asked])
-            seen_fitness = np.concatenate([self.fitness, told])
-            kept = best_of(seen_fitness, len(asked))
-            self.population = read_only(seen[kept])
-            self.fitness = read_only(seen_fitness[kept])
-        self.generation += 1
-        self._asked = None
+            return
+        seen = np.concatenate([self.population, asked])
+        fitness = np.concatenate([self.fitness, told])
+        kept = best_of(fitness, len(asked))
+        self.population, self.fitness = read_only(seen[kept]), read_only(fitness[kept])
 
     def _drawn(self, rng: Generator) -> np.ndarray:
         """Genomes `(population, genes)`, uniform in the initial range."""

@@ -48,6 +48,7 @@ NUMPY_ONLY = {
     "evolution/ask_tell.py",
     "evolution/bounds.py",
     "evolution/optimizer.py",
+    "evolution/search_space.py",
     "evolution/differential_evolution.py",
     "evolution/genetic_algorithm.py",
     "evolution/random_search.py",

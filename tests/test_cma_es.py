@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from cmaes import CMA
 
-from evolution.ask_tell import SearchSpace
 from evolution.cma_es import CmaEs, CmaEsParameters, made_finite
+from evolution.search_space import SearchSpace
 
 SPACE = SearchSpace(genes=3, lower=-5, upper=5, init_lower=-5, init_upper=5)
 

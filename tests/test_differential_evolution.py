@@ -9,7 +9,6 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evolution.ask_tell import SearchSpace
 from evolution.bounds import BOUNDS_RULES
 from evolution.differential_evolution import (
     STRATEGIES,
@@ -18,6 +17,7 @@ from evolution.differential_evolution import (
     binomial_crossover,
     distinct_parents,
 )
+from evolution.search_space import SearchSpace
 
 # Neither a slow machine nor a lucky draw decides a test.
 steady = settings(deadline=None, derandomize=True)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from evolution.ask_tell import SearchSpace
 from evolution.bounds import BOUNDS_RULES
 from evolution.evolution_strategy import (
     SIGMA_MIN,
@@ -14,6 +13,7 @@ from evolution.evolution_strategy import (
     EvolutionStrategyParameters,
     one_fifth_rule,
 )
+from evolution.search_space import SearchSpace
 
 SPACE = SearchSpace(genes=3, lower=-5, upper=5, init_lower=-5, init_upper=5)
 

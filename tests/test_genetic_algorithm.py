@@ -6,7 +6,6 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evolution.ask_tell import SearchSpace
 from evolution.genetic_algorithm import (
     GeneticAlgorithm,
     GeneticAlgorithmParameters,
@@ -15,6 +14,7 @@ from evolution.genetic_algorithm import (
     one_point_crossover,
     tournament_winners,
 )
+from evolution.search_space import SearchSpace
 
 # Neither a slow machine nor a lucky draw decides a test.
 steady = settings(deadline=None, derandomize=True)

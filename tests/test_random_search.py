@@ -6,8 +6,8 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evolution.ask_tell import SearchSpace
 from evolution.random_search import RandomSearch, RandomSearchParameters, best_of
+from evolution.search_space import SearchSpace
 
 # Neither a slow machine nor a lucky draw decides a test.
 steady = settings(deadline=None, derandomize=True)
