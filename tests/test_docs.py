@@ -1,0 +1,97 @@
+"""What the documents say works: their code is run as a reader would run it."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+OPTIMIZERS = (ROOT / "docs" / "optimizers.md").read_text()
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", OPTIMIZERS, re.M | re.S)
+
+
+def python(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-W", "error", *words],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+def test_fitness_in_a_script():
+    script, _ = blocks("python")
+    done = python("-c", script, cwd=ROOT)
+    assert done.stderr == ""
+    lines = done.stdout.splitlines()
+    assert len(lines) == 3
+    assert all(re.match(r"best of 300: \d+\.\d, mean \d+\.\d$", x) for x in lines)
+
+
+@pytest.fixture(scope="module")
+def extended(tmp_path_factory) -> Path:
+    """The packages, with the optimiser of the document."""
+    folder = tmp_path_factory.mktemp("extended")
+    ignored = shutil.ignore_patterns("__pycache__")
+    for name in ("epuck_mj", "evolution", "models", "tests"):
+        shutil.copytree(ROOT / name, folder / name, ignore=ignored)
+    (folder / "evolution" / "particle_swarm.py").write_text(blocks("python")[1])
+    path = folder / "evolution" / "optimizer.py"
+    text = path.read_text()
+    (patch,) = blocks("diff")
+    for hunk in patch.strip("\n").split("\n\n"):
+        after = [line[1:] for line in hunk.splitlines()]
+        before = [line[1:] for line in hunk.splitlines() if line[0] == " "]
+        assert text.count("\n".join(before)) == 1
+        text = text.replace("\n".join(before), "\n".join(after))
+    path.write_text(text)
+    config, study = blocks("yaml")
+    (folder / "evolution" / "configs" / "particle-swarm.yaml").write_text(config)
+    (folder / "mine.yaml").write_text(study)
+    return folder
+
+
+@pytest.mark.slow
+def test_an_optimiser_of_ones_own_is_as_good_as_the_shipped_ones(extended):
+    path = extended / "tests" / "test_optimizer.py"
+    first = '    "de-best reevaluated":'
+    text = path.read_text()
+    assert text.count(first) == 1
+    line = '    "particle-swarm": ALGORITHMS["particle_swarm"](),\n'
+    path.write_text(text.replace(first, line + first))
+    chosen = ["-k", "particle-swarm", "tests/test_optimizer.py"]
+    done = python("-m", "pytest", "-q", "-p", "no:cacheprovider", *chosen, cwd=extended)
+    assert done.returncode == 0, done.stdout
+    assert re.search(r"[1-9]\d passed", done.stdout)
+
+
+@pytest.mark.slow
+def test_an_optimiser_of_ones_own_in_a_study(extended):
+    run = ["-m", "evolution.run", "particle-swarm", "--evaluations", "120"]
+    run += ["--steps", "10", "--trials", "2", "--output", "runs/one"]
+    done = python(*run, cwd=extended)
+    assert done.returncode == 0, done.stderr
+    assert "particle-swarm, seed 1: 120 evaluations in 3 generations" in done.stdout
+    done = python(*run[:-1], "runs/all-live", "--no-racing", cwd=extended)
+    assert done.returncode == 0, done.stderr
+    one, other = (
+        (extended / "runs" / name / "history.csv").read_bytes()
+        for name in ("one", "all-live")
+    )
+    assert one == other
+    code = (
+        "from pathlib import Path; from evolution.study_config import StudyConfig; "
+        "print(*StudyConfig.load(Path('mine.yaml')).experiments)"
+    )
+    assert python("-c", code, cwd=extended).stdout.split() == [
+        "de-best",
+        "ga",
+        "particle-swarm",
+    ]
