@@ -114,7 +114,7 @@ def racing(argv: Sequence[str]) -> int:
         f"{result['median_share_of_time']:.3f} of the time"
     )
     if options.json is not None:
-        with files.writing(options.json.parent):
+        with files.writing():
             files.write_text(options.json, json.dumps(result, indent=1) + "\n")
     return 0
 

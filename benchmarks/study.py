@@ -110,7 +110,7 @@ def study(argv: Sequence[str]) -> int:
         found |= overhead(options.evaluations)
         print(f"overhead: {found['overhead']:.1%} of the wall time")
     if options.json is not None:
-        with files.writing(options.json.parent):
+        with files.writing():
             files.write_text(options.json, json.dumps(found, indent=1) + "\n")
     return 0
 

@@ -128,7 +128,7 @@ def draw(argv: Sequence[str]) -> int:
         raise UserError(f"no recording '{options.recording}'")
     with viewer(options.recording, options.size) as client:
         pixels = picture(client, options.time)
-    with writing(options.output.parent):
+    with writing():
         write_bytes(options.output, pixels)
     return 0
 

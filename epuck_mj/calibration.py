@@ -12,7 +12,7 @@ import numpy as np
 from epuck_mj.constants import N_PROXIMITY, N_WHEELS, TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.files import write_text, writing
-from epuck_mj.yaml_files import read_mapping, to_yaml
+from epuck_mj.mappings import read_yaml, to_yaml
 
 GAIN_MAX = 100.0
 """What no sensor's gain reaches."""
@@ -76,7 +76,7 @@ class Calibration:
             "wheel_radii": [float(radius) for radius in self.wheel_radii],
             "track": float(self.track),
         }
-        with writing(path.parent):
+        with writing():
             write_text(path, to_yaml(content))
 
     @classmethod
@@ -87,7 +87,7 @@ class Calibration:
             UserError: if the file is missing, damaged or something else.
         """
         try:
-            return cls.from_dict(read_mapping(path))
+            return cls.from_dict(read_yaml(path))
         except ValueError as error:
             raise UserError(f"'{path}' is not a calibration: {error}") from None
 

@@ -7,9 +7,12 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from epuck_mj.constants import PROXIMITY_RANGE
-from epuck_mj.fitness import STEP_FITNESS_MAX, StepFitness, step_fitness
+from epuck_mj.fitness import STEP_FITNESS, STEP_FITNESS_MAX, StepFitness, step_fitness
 from epuck_mj.motors import Speeds, command
 from epuck_mj.sensors import Reading, observe
+
+STEPS_MAX = 10_000_000
+"""Of a trial: more is a mistake."""
 
 Policy = Callable[[np.ndarray], np.ndarray]
 
@@ -67,10 +70,12 @@ class TaskParameters:
         try:
             task = cls(**{**fields, "speeds": Speeds(**fields["speeds"])})
             numbers = (task.control_step, task.sensor_range, *astuple(task.speeds))
-            if not (isinstance(task.steps, int) and task.steps > 0):
-                raise ValueError(f"expected steps above 0, got {task.steps!r}")
+            if type(task.steps) is not int or not 0 < task.steps <= STEPS_MAX:
+                raise ValueError(f"expected 1 to {STEPS_MAX} steps, got {task.steps!r}")
             if not all(0 < number < float("inf") for number in numbers):
                 raise ValueError(f"expected numbers above 0, got {numbers}")
+            if task.fitness not in list(STEP_FITNESS):
+                raise ValueError(f"unknown fitness {task.fitness!r}")
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError(f"not the parameters of a task: {error}") from None
         return task

@@ -1,4 +1,4 @@
-"""Controller files: a controller with its task, its origin and its worth, as JSON."""
+"""Controller files: a controller with its task, its origin and its scores, as JSON."""
 
 import json
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ import numpy as np
 from epuck_mj.control import TaskParameters
 from epuck_mj.controller import Controller, Network
 from epuck_mj.errors import UserError
-from epuck_mj.files import read_text
+from epuck_mj.mappings import read_json
 
 FORMAT = "epuck_mj.controller/1"
 
@@ -31,7 +31,7 @@ class Origin:
     robot: str
     arena: str
     start_clearance: float | None = None
-    mjcf_sha256: Mapping[str, str] = field(default_factory=dict)
+    mjcf_sha256: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
@@ -50,6 +50,8 @@ class Origin:
                 f"expected a start_clearance in (0, 1] m, got {clearance!r}"
             )
         hashes = fields.get("mjcf_sha256", {})
+        if not isinstance(hashes, dict):
+            raise ValueError(f"expected an object as mjcf_sha256, got {hashes!r}")
         return cls(fields["robot"], fields["arena"], clearance, hashes)
 
 
@@ -89,24 +91,23 @@ class ControllerFile:
         return json.dumps(fields, indent=1) + "\n"
 
     @classmethod
-    def from_json(cls, text: str) -> Self:
-        """Read `to_json`'s text back.
+    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
+        """What `to_json`'s text says.
 
         Raises:
             ValueError: if it is anything else.
         """
-        fields = json.loads(text)
-        if not isinstance(fields, dict) or fields.get("format") != FORMAT:
-            raise ValueError(f"expected a JSON object with format '{FORMAT}'")
+        if fields.get("format") != FORMAT:
+            raise ValueError(f"expected format '{FORMAT}'")
         for name in ("network", "task", "scene", "scores"):
             if not isinstance(fields.get(name), dict):
                 raise ValueError(f"expected an object as {name}")
         network = Network(**fields["network"])
-        genome = np.array(fields["genome"], float)
-        if genome.shape != (network.n_genes,) or not np.isfinite(genome).all():
-            raise ValueError(
-                f"expected {network.n_genes} finite genes, got {genome.size}"
-            )
+        genome = np.array(fields.get("genome", ()), float)
+        if genome.shape != (network.n_genes,):
+            raise ValueError(f"expected {network.n_genes} genes, got {genome.shape}")
+        if not np.isfinite(genome).all():
+            raise ValueError("expected finite genes")
         task = TaskParameters.from_dict(fields["task"])
         origin = Origin.from_dict(fields["scene"])
         return cls(network, genome, task, origin, fields["scores"])
@@ -118,8 +119,8 @@ def load(path: str | Path) -> ControllerFile:
     Raises:
         UserError: if there is none, or it is not a controller file.
     """
-    text = read_text(Path(path))
+    fields = read_json(Path(path))
     try:
-        return ControllerFile.from_json(text)
-    except (ValueError, KeyError, TypeError) as error:
+        return ControllerFile.from_dict(fields)
+    except (ValueError, TypeError, OverflowError) as error:
         raise UserError(f"'{path}' is not a controller file: {error}") from None

@@ -1,4 +1,4 @@
-"""Files that are there in full or not at all."""
+"""Files: found, read, and written in full or not at all."""
 
 import io
 import os
@@ -22,13 +22,18 @@ def write_bytes(path: Path, content: bytes) -> None:
     # named before it is there: whenever a signal comes, it is known what to remove
     temporary = _temporary(path)
     try:
-        with temporary.open("xb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
+        try:
+            with temporary.open("xb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        # of the temporary one nobody has heard
+        error.filename, error.filename2 = str(path), None
         raise
 
 
@@ -67,7 +72,7 @@ def find(name: str, kind: str, shipped: Mapping[str, Path], form: str) -> Path:
         name: of a shipped file, or the path of a person's own.
         kind: what it is.
         shipped: files by name.
-        form: what its text is called.
+        form: of its text, with an article: `a YAML`.
 
     Raises:
         UserError: if there is none.
@@ -82,17 +87,18 @@ def find(name: str, kind: str, shipped: Mapping[str, Path], form: str) -> Path:
 
 
 @contextmanager
-def writing(folder: Path) -> Iterator[None]:
+def writing() -> Iterator[None]:
     """What cannot be written in the block is the user's to put right.
 
     Raises:
-        UserError: naming the file.
+        UserError: naming the file, if the system does.
     """
     try:
         yield
     except OSError as error:
-        name = error.filename2 or error.filename or folder
-        raise UserError(f"cannot write '{name}': {error.strerror}") from None
+        name = error.filename2 or error.filename
+        what = "cannot write" if name is None else f"cannot write '{name}'"
+        raise UserError(f"{what}: {error.strerror or error}") from None
 
 
 def check_writable(path: Path) -> None:
@@ -133,7 +139,7 @@ def read_text(path: Path) -> str:
     """The text of a file.
 
     Raises:
-        UserError: if it is missing, or not UTF-8.
+        UserError: if it is missing, not to be read, or not UTF-8.
     """
     try:
         return path.read_text(encoding="utf-8")

@@ -1,7 +1,4 @@
-"""What every robot and every arena must have, by MuJoCo's names.
-
-Robots differ in their base and nothing else.
-"""
+"""What every robot and every arena must have, by MuJoCo's names."""
 
 from pathlib import Path
 
@@ -15,12 +12,18 @@ ROBOT_BODY = "epuck"
 SHELL = "shell"
 WHEELS = ("wheel_left", "wheel_right")
 PROXIMITY = tuple(f"ps{i}" for i in range(N_PROXIMITY))
+TIMESTEP = "timestep"
+"""A number that a robot's MJCF may bring: its physics step [s]."""
 
 _JOINT, _SENSOR = mujoco.mjtJoint, mujoco.mjtSensor
 
 
 def check_base(model: mujoco.MjModel, robot: Path) -> None:
-    """Refuse a base on which no pose can be set."""
+    """Refuse a base on which no pose can be set.
+
+    Raises:
+        UserError: if it is one.
+    """
     body = index_of(model, mujoco.mjtObj.mjOBJ_BODY, ROBOT_BODY, robot)
     first, count = model.body_jntadr[body], model.body_jntnum[body]
     types = tuple(model.jnt_type[first : first + count])
@@ -38,7 +41,11 @@ def check_base(model: mujoco.MjModel, robot: Path) -> None:
 
 
 def check_floor(model: mujoco.MjModel, arena: Path) -> None:
-    """Refuse a floor that the shell would hit, and wheels with nothing to drive on."""
+    """Refuse a floor that the shell would hit, and wheels with nothing to drive on.
+
+    Raises:
+        UserError: if the arena has either.
+    """
     shell, ground = model.geom(SHELL).id, static(model)
     planes = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
     for geom in np.flatnonzero(ground & planes & can_touch(model, shell)).tolist():
@@ -70,7 +77,11 @@ def can_touch(model: mujoco.MjModel, geom: int) -> np.ndarray:
 
 
 def sensor_address(model: mujoco.MjModel, name: str, kind: int, robot: Path) -> int:
-    """Address of a sensor of that kind in sensordata."""
+    """Address of a sensor of that kind in sensordata.
+
+    Raises:
+        UserError: if there is none.
+    """
     sensor = index_of(model, mujoco.mjtObj.mjOBJ_SENSOR, name, robot)
     if model.sensor_type[sensor] != kind:
         raise UserError(
@@ -81,7 +92,11 @@ def sensor_address(model: mujoco.MjModel, name: str, kind: int, robot: Path) -> 
 
 
 def index_of(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, robot: Path) -> int:
-    """Index of a named part of the robot."""
+    """Index of a named part of the robot.
+
+    Raises:
+        UserError: if there is none; names those there are.
+    """
     index = mujoco.mj_name2id(model, kind.value, name)
     if index >= 0:
         return index

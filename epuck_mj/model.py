@@ -20,6 +20,7 @@ from epuck_mj.interface import (
     PROXIMITY,
     ROBOT_BODY,
     SHELL,
+    TIMESTEP,
     WHEELS,
     check_base,
     check_floor,
@@ -28,8 +29,6 @@ from epuck_mj.interface import (
 )
 from epuck_mj.mjcf import find_arena, find_robot, with_robot
 from epuck_mj.sensors import Reading
-
-TIMESTEP = "timestep"
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ def save_figure(figure: Figure, path: str | Path, dpi: int = 150) -> None:
     """
     content = io.BytesIO()
     figure.savefig(content, format="png", dpi=dpi, metadata=UNSIGNED)
-    with writing(Path(path)):
+    with writing():
         write_bytes(Path(path), content.getvalue())
 
 
@@ -33,5 +33,5 @@ def save_pixels(pixels: np.ndarray, path: str | Path) -> None:
     """
     content = io.BytesIO()
     imsave(content, pixels, format="png", metadata={"Software": "epuck_mj"})
-    with writing(Path(path)):
+    with writing():
         write_bytes(Path(path), content.getvalue())

@@ -104,7 +104,7 @@ class Trajectory:
             UserError: if it cannot be written.
         """
         arrays = {field.name: getattr(self, field.name) for field in fields(self)}
-        with writing(Path(path)):
+        with writing():
             write_arrays(Path(path), {"format": np.array(FORMAT), **arrays})
 
     @classmethod

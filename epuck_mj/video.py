@@ -66,5 +66,5 @@ def save_video(
                     progress(i + 1, len(times))
             finally:
                 frames.close()
-        with writing(Path(path).parent):
+        with writing():
             write_bytes(Path(path), file.read_bytes())

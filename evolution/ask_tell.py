@@ -61,7 +61,13 @@ def restored_generator(rng: Generator, text: np.ndarray) -> Generator:
     bit_generator = type(rng.bit_generator)()
     try:
         bit_generator.state = json.loads(str(text))
-    except (ValueError, TypeError, KeyError, OverflowError) as error:
+    except (
+        ValueError,
+        TypeError,
+        KeyError,
+        OverflowError,
+        RecursionError,
+    ) as error:
         raise ValueError(
             f"expected the state of a {type(bit_generator).__name__} bit generator, "
             f"got {str(text)[:60]!r}"
@@ -159,13 +165,18 @@ class AskTell(ABC):
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """See `Optimizer.restore`."""
         arrays = checked_state(state, like=self._arrays())
-        self._rng = restored_generator(self._rng, arrays["generator"])
+        rng = restored_generator(self._rng, arrays["generator"])
+        self._load(arrays)
+        self._rng = rng
         self.generation = int(arrays["generation"])
         self._asked = None
-        self._load(arrays)
 
     def _load(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Take over what an algorithm adds to the state, and the population."""
+        """Take over the population, and what an algorithm adds to the state.
+
+        The arrays have the shapes and types of `_arrays`; whatever else can be wrong
+        with them has to be found before anything is taken over.
+        """
         self.population = read_only(arrays["population"])
         self.fitness = read_only(arrays["fitness"])
 

@@ -1,4 +1,4 @@
-"""Bounds rules of differential evolution: where a gene outside the bounds goes.
+"""Bounds rules, for optimisers that leave the box: where a gene outside of it goes.
 
 The paper does not say. With CR = 1 and F = 0.8 it is a common case, so it matters.
 """

@@ -104,15 +104,11 @@ class CmaEs(AskTell):
         self._birth = generator_state(rng)
         self._told = [np.empty(0)]
         self._cma = self._started(parameters.population)
-        super().__init__("cma-es", self._drawn(), rng)
+        super().__init__("cma-es", self._propose(), rng)
 
     def next_size(self) -> int:
         """See `Optimizer.next_size`."""
         return self._cma.population_size
-
-    def _propose(self) -> np.ndarray:
-        """What the present search draws next."""
-        return self._drawn()
 
     def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Make the generation asked the current one; start again if it is time."""
@@ -171,6 +167,6 @@ class CmaEs(AskTell):
             population_size=population,
         )
 
-    def _drawn(self) -> np.ndarray:
+    def _propose(self) -> np.ndarray:
         """The next genomes of the present search `(next_size(), genes)`."""
         return np.array([self._cma.ask() for _ in range(self.next_size())])

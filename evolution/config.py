@@ -22,10 +22,10 @@ from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
 from epuck_mj.control import TaskParameters
 from epuck_mj.controller import Network
 from epuck_mj.errors import UserError
+from epuck_mj.mappings import parse_yaml, to_yaml
 from epuck_mj.mjcf import absolute
 from epuck_mj.motors import Speeds
 from epuck_mj.tasks import START_CLEARANCE
-from epuck_mj.yaml_files import parse, to_yaml
 from evolution.conditions import Conditions
 from evolution.optimizer import ALGORITHMS, OptimizerParameters, SearchSpace
 
@@ -205,7 +205,7 @@ class ExperimentConfig(BaseModel):
         Raises:
             UserError: beginning with `where`, if it is anything else.
         """
-        return cls.parsed(parse(text, where), where)
+        return cls.parsed(parse_yaml(text, where), where)
 
     @classmethod
     def parsed(cls, fields: Any, where: str) -> Self:

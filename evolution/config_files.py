@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from epuck_mj.files import find
-from epuck_mj.yaml_files import read_mapping
+from epuck_mj.mappings import read_yaml
 from evolution.config import ExperimentConfig
 
 CONFIGS = Path(__file__).resolve().parent / "configs"
@@ -13,7 +13,7 @@ DEFAULT_EXPERIMENT = "de-best"
 def shipped_with(key: str) -> dict[str, Path]:
     """The shipped files by name that have this key, in the order of their names."""
     files = sorted(CONFIGS.glob("*.yaml"), key=lambda path: path.stem)
-    return {path.stem: path for path in files if key in read_mapping(path)}
+    return {path.stem: path for path in files if key in read_yaml(path)}
 
 
 def shipped_experiments() -> dict[str, Path]:
@@ -36,4 +36,4 @@ def load_config(path: Path) -> ExperimentConfig:
     Raises:
         UserError: if the file is missing, not YAML, or says something unknown.
     """
-    return ExperimentConfig.parsed(read_mapping(path), f"'{path}'")
+    return ExperimentConfig.parsed(read_yaml(path), f"'{path}'")

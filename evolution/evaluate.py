@@ -105,7 +105,7 @@ def evaluate(argv: Sequence[str]) -> int:
             }
             tests.append(where | asdict(conditions) | asdict(test))
     if options.json is not None:
-        with files.writing(options.json.parent):
+        with files.writing():
             files.write_text(options.json, json.dumps(tests, indent=1) + "\n")
     return 0
 

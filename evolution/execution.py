@@ -106,7 +106,7 @@ class Run:
         Raises:
             UserError: if it cannot be written.
         """
-        with writing(self.directory.path):
+        with writing():
             controller = write_results(
                 self.experiment, self._judges, self.directory, self._threads
             )

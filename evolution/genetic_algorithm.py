@@ -167,22 +167,20 @@ class GeneticAlgorithm(AskTell):
         self._space = space
         shape = (parameters.population, length)
         self._chromosomes = rng.integers(2, size=shape).astype(bool)
-        # of what was asked
-        self._bred = self._chromosomes
         super().__init__("ga", self._decoded(self._chromosomes), rng)
 
     def _propose(self) -> np.ndarray:
         """Offspring of the generation last told, after its elites."""
-        self._bred = self._offspring()
-        return self._decoded(self._bred)
+        # those of the population are of no more use
+        self._chromosomes = self._offspring()
+        return self._decoded(self._chromosomes)
 
     def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Make the generation asked the current one."""
-        self._chromosomes = self._bred
         self.population, self.fitness = read_only(asked), read_only(told)
 
     def _load(self, arrays: Mapping[str, np.ndarray]) -> None:
-        self._chromosomes = self._bred = arrays["chromosomes"]
+        self._chromosomes = arrays["chromosomes"]
         self.population = read_only(self._decoded(self._chromosomes))
         self.fitness = read_only(arrays["fitness"])
 

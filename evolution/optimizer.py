@@ -1,8 +1,8 @@
 """The ask/tell protocol of an optimiser and the table of those that are shipped.
 
-The modules behind it do not know this one: `ask_tell` has the shared rules, one module
-each the algorithms. The baselines beside the paper's are random search, (1+1)-ES and
-CMA-ES.
+The modules behind it do not know this one: `ask_tell` has the shared rules,
+`search_space` the box, one module each the algorithms. The baselines beside the paper's
+are random search, (1+1)-ES and CMA-ES.
 
     optimizer = make_optimizer(config.optimizer, config.search_space, rng)
     while spent + optimizer.next_size() <= budget:

@@ -84,7 +84,7 @@ def reproduce(argv: Sequence[str]) -> int:
     wheels = others[0] if others else None
     text = reproduction(main_study, wheels, unevolved, command(MODULE, *argv))
     path = options.output / "REPRODUCTION.md"
-    with files.writing(options.output):
+    with files.writing():
         options.output.mkdir(parents=True, exist_ok=True)
         files.write_text(path, text)
     print(f"Written: {path}")

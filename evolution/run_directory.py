@@ -1,7 +1,6 @@
 """The run directory: what a run leaves behind, and what it can be resumed from."""
 
 import csv
-import json
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
@@ -11,6 +10,7 @@ from filelock import FileLock, Timeout
 
 from epuck_mj import files
 from epuck_mj.errors import UserError
+from epuck_mj.mappings import read_json
 from evolution.config import ExperimentConfig, differing_keys
 from evolution.config_files import load_config
 from evolution.experiment import Experiment
@@ -31,7 +31,7 @@ def locked(directory: Path, patience: float = 0.0) -> Iterator[None]:
     Raises:
         UserError: if one is there all that time, or the directory cannot be made.
     """
-    with files.writing(directory):
+    with files.writing():
         directory.mkdir(parents=True, exist_ok=True)
     lock = FileLock(directory / LOCK, timeout=patience)
     try:
@@ -99,7 +99,7 @@ class RunDirectory:
             UserError: if it cannot be written.
         """
         self.refuse_if_used()
-        with files.writing(self.path):
+        with files.writing():
             self.path.mkdir(parents=True, exist_ok=True)
             files.remove_leftovers(self.path)
             files.write_text(self.config, config.to_yaml())
@@ -152,7 +152,7 @@ class RunDirectory:
                 raise UserError(
                     f"'{self.checkpoint}' is not a checkpoint of this run: {error}"
                 ) from None
-        with files.writing(self.path):
+        with files.writing():
             files.remove_leftovers(self.path)
             # the run may have been killed between its files
             self._write_derived(experiment, ())
@@ -234,7 +234,7 @@ class RunDirectory:
     def mark_finished(self) -> None:
         """Write down when everything was there."""
         fields = self.provenance_fields() | {"finished": now()}
-        with files.writing(self.path):
+        with files.writing():
             files.write_text(self.provenance, to_json(fields))
 
     def contents(self) -> str:
@@ -254,13 +254,7 @@ class RunDirectory:
         """
         if not files.is_file(self.provenance):
             return {}
-        text = files.read_text(self.provenance)
-        try:
-            fields = json.loads(text)
-            if not isinstance(fields, dict):
-                raise ValueError("not an object")
-            if not isinstance(fields.get("resumed", []), list):
-                raise ValueError("'resumed' is not a list")
-        except ValueError as error:
-            raise UserError(f"'{self.provenance}' is damaged: {error}") from None
+        fields = read_json(self.provenance)
+        if not isinstance(fields.get("resumed", []), list):
+            raise UserError(f"'{self.provenance}' is damaged: 'resumed' is not a list")
         return fields

@@ -125,7 +125,7 @@ def _measure_yardstick(directory: StudyDirectory, config: StudyConfig) -> None:
         for robot, judge in judges(world).items()
     }
     # whoever opens the study removes what looks left over
-    with locked(directory.path, PATIENCE), files.writing(directory.path):
+    with locked(directory.path, PATIENCE), files.writing():
         text = json.dumps({"held_out": tests}, indent=1) + "\n"
         files.write_text(directory.yardstick, text)
 

@@ -9,7 +9,7 @@ from typing import Self
 
 from epuck_mj.errors import UserError
 from epuck_mj.files import find
-from epuck_mj.yaml_files import read_mapping, to_yaml
+from epuck_mj.mappings import read_yaml, to_yaml
 from evolution.config import ExperimentConfig, differing_keys
 from evolution.config_files import find_config, load_config, shipped_with
 
@@ -35,7 +35,7 @@ class StudyConfig:
         Raises:
             UserError: if a file is missing or says something unknown.
         """
-        content = read_mapping(path)
+        content = read_yaml(path)
         unknown = [key for key in content if key not in KEYS]
         if unknown:
             raise UserError(
@@ -108,7 +108,7 @@ class StudyConfig:
         """
         experiments = {
             str(name): ExperimentConfig.parsed(fields, f"'{path}', {name}")
-            for name, fields in read_mapping(path).items()
+            for name, fields in read_yaml(path).items()
         }
         if not experiments:
             raise UserError(f"'{path}': expected experiments, got none")
@@ -173,7 +173,7 @@ def seeds_from_yaml(path: Path) -> dict[str, list[int]]:
     Raises:
         UserError: if it is damaged.
     """
-    stored = read_mapping(path)
+    stored = read_yaml(path)
     return {str(name): parse_seeds(str(text)) for name, text in stored.items()}
 
 

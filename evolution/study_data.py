@@ -1,6 +1,5 @@
 """What a study has found so far, read back from its directory."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from pydantic import BaseModel, Field, FiniteFloat, StrictInt, ValidationError
 from epuck_mj import controller_file, files
 from epuck_mj.controller_file import ControllerFile
 from epuck_mj.errors import UserError
+from epuck_mj.mappings import read_json
 from epuck_mj.wall_follower import YARDSTICK
 from evolution.config import ExperimentConfig, differing_keys
 from evolution.experiment import HISTORY
@@ -242,10 +242,7 @@ def _yardstick(directory: StudyDirectory, robots: Sequence[str]) -> dict[str, di
     path = directory.yardstick
     if not path.is_file():
         return {}
-    try:
-        fields = json.loads(files.read_text(path))
-    except ValueError as error:
-        raise UserError(f"'{path}' is damaged: {error}") from None
+    fields = read_json(path)
     check_scores(fields, path, _Yardstick)
     missing = [robot for robot in robots if robot not in fields["held_out"]]
     if missing:

@@ -69,7 +69,7 @@ class StudyDirectory:
         """
         if files.is_file(self.path):
             raise UserError(f"output '{self.path}' is not a directory")
-        with files.writing(self.path):
+        with files.writing():
             # in this order: another process may write the study meanwhile
             if self._holds_anything() and not files.is_file(self.config):
                 raise UserError(

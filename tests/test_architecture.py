@@ -11,7 +11,7 @@ MODULES = sorted([*ROOT.glob("epuck_mj/**/*.py"), *ROOT.glob("evolution/**/*.py"
 LAYERS = [
     {"errors", "constants", "interruption"},
     {"sensors", "motors", "fitness", "controller", "files", "command_line"},
-    {"control", "wall_follower", "interface", "colors", "pictures", "yaml_files"},
+    {"control", "wall_follower", "interface", "colors", "pictures", "mappings"},
     {"mjcf", "calibration", "controller_file"},
     {"model", "disturbances"},
     {"simulation", "geometry"},
@@ -71,7 +71,7 @@ ALLOWED_IN = {
         "evolution/gap/figure.py",
         "evolution/report/figures/",
     ),
-    "yaml": "epuck_mj/yaml_files.py",
+    "yaml": "epuck_mj/mappings.py",
 }
 """Packages that only one place may import."""
 

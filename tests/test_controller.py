@@ -1,4 +1,4 @@
-"""The network against a slow loop, and controller files."""
+"""The network against a slow loop."""
 
 import math
 

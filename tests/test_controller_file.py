@@ -1,3 +1,5 @@
+"""Controller files: read back, and refused."""
+
 import json
 
 import numpy as np
@@ -34,11 +36,14 @@ def test_file_comes_back_bit_for_bit(tmp_path, stored):
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ({"format": "other"}, "expected a JSON object with format"),
-        ({"genome": [1.0, 2.0]}, "expected 40 finite genes, got 2"),
-        ({"genome": [float("nan")] * 40}, "expected 40 finite genes"),
+        ({"format": "other"}, "expected format 'epuck_mj.controller/1'"),
+        ({"genome": [1.0, 2.0]}, "expected 40 genes, got (2,)"),
+        ({"genome": [float("nan")] * 40}, "expected finite genes"),
+        ({"genome": [[1.0] * 40]}, "expected 40 genes, got (1, 40)"),
+        ({"genome": [10**400] * 40}, "too large"),
+        ({"genome": None}, "expected 40 genes, got ()"),
         ({"network": {"layers": 3}}, "layers"),
-        ({"network": {"hidden": 5, "biases": False}}, "expected 50 finite genes"),
+        ({"network": {"hidden": 5, "biases": False}}, "expected 50 genes, got (40,)"),
         ({"network": None}, "expected an object as network"),
         ({"scores": [1.0]}, "expected an object as scores"),
         ({"task": {}}, "not the parameters of a task: 'speeds'"),
@@ -48,6 +53,10 @@ def test_file_comes_back_bit_for_bit(tmp_path, stored):
         (
             {"scene": {"robot": "a", "arena": "b", "start_clearance": 2.0}},
             "expected a start_clearance in (0, 1] m, got 2.0",
+        ),
+        (
+            {"scene": {"robot": "a", "arena": "b", "mjcf_sha256": [1]}},
+            "expected an object as mjcf_sha256, got [1]",
         ),
     ],
 )
@@ -59,15 +68,38 @@ def test_foreign_files_are_refused(tmp_path, stored, change, expected):
     assert expected in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"steps": 0}, "expected 1 to 10000000 steps, got 0"),
+        ({"steps": True}, "got True"),
+        ({"steps": 10**400}, "steps, got 1000"),
+        ({"control_step": -0.1}, "expected numbers above 0"),
+        ({"fitness": "best"}, "unknown fitness 'best'"),
+        ({"fitness": ["product"]}, "unknown fitness ['product']"),
+        ({"speeds": {"sideways": 1.0}}, "sideways"),
+        ({"wheels": 3}, "wheels"),
+    ],
+)
+def test_another_task_is_refused(tmp_path, stored, change, expected):
+    fields = json.loads(stored.to_json())
+    fields["task"] |= change
+    path = tmp_path / "champion.json"
+    path.write_text(json.dumps(fields))
+    with pytest.raises(UserError, match="not the parameters of a task: ") as error:
+        load(path)
+    assert expected in str(error.value)
+
+
 def test_missing_and_broken_files_are_refused(tmp_path, stored):
     with pytest.raises(UserError, match="cannot read"):
         load(tmp_path / "nothing.json")
     path = tmp_path / "half.json"
     path.write_text(stored.to_json()[:100])
-    with pytest.raises(UserError, match="is not a controller file"):
+    with pytest.raises(UserError, match="is not JSON"):
         load(path)
     path.write_text("[1, 2]")
-    with pytest.raises(UserError, match="is not a controller file"):
+    with pytest.raises(UserError, match="expected a mapping of keys to values, got l"):
         load(path)
 
 

@@ -1,10 +1,11 @@
-"""Files that are there in full or not at all."""
+"""Files: found, read, and written in full or not at all."""
 
 from pathlib import Path
 
 import pytest
 
 from epuck_mj import files
+from epuck_mj.errors import UserError
 
 
 class StopError(BaseException):
@@ -43,3 +44,41 @@ def test_leftovers_are_ours_alone(tmp_path):
         (tmp_path / name).write_text("")
     files.remove_leftovers(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(mine)
+
+
+@pytest.mark.parametrize("name", ["no/such/a.csv", "taken/a.csv", "folder"])
+def test_what_cannot_be_written_is_named_as_it_was_asked_for(name, tmp_path):
+    (tmp_path / "taken").write_text("")
+    (tmp_path / "folder").mkdir()
+    path = tmp_path / name
+    with pytest.raises(UserError) as error, files.writing():
+        files.write_text(path, "new")
+    assert str(error.value).startswith(f"cannot write '{path}': ")
+    assert not [each for each in tmp_path.iterdir() if files.is_leftover(each)]
+
+
+def test_a_file_is_found_by_name_or_path(tmp_path):
+    mine, shipped = tmp_path / "mine.xml", tmp_path / "round.xml"
+    mine.write_text("")
+    shipped.write_text("")
+
+    def found(name):
+        return files.find(name, "arena", {"round": shipped}, "an MJCF")
+
+    assert found("round") == shipped
+    assert found(str(mine)) == mine
+    for name in ("square", str(tmp_path), "", "a" * 300, "\0"):
+        with pytest.raises(UserError) as error:
+            found(name)
+        assert str(error.value) == (
+            f"no arena '{name}': expected the path of an MJCF file or one of round"
+        )
+
+
+@pytest.mark.parametrize("name", ["nobody", ".", "a" * 300, "\0", "binary"])
+def test_what_cannot_be_read_is_one_line(name, tmp_path):
+    (tmp_path / "binary").write_bytes(b"\xff\xfe")
+    with pytest.raises(UserError, match="cannot read '") as error:
+        files.read_text(tmp_path / name)
+    assert "\n" not in str(error.value)
+    assert "None" not in str(error.value)

@@ -400,5 +400,5 @@ def test_files_are_repeatable_small_and_sound(tmp_path):
 
 
 def test_a_folder_that_is_not_there_is_the_users_error(data, tmp_path):
-    with pytest.raises(UserError, match=r"cannot write .*a\.svg"):
+    with pytest.raises(UserError, match=r"cannot write .*/a\.svg'"):
         save(fitness(data, "ga")[0], tmp_path / "nowhere", "a")

@@ -10,8 +10,8 @@ Bytes and times as arguments; nothing opens a port, waits or looks at a clock:
 
 With ports and clocks:
 
-- `link`: a conversation on a port, the only `import serial`; `serial_line` and
-  `wifi_line`: what a `connection` offers, on either.
+- `serial_port`: a port, the only `import serial`; `link`: a conversation on it;
+  `serial_line` and `wifi_line`: what a `connection` offers, on either.
 - `robot`: `control.Robot` on a connection, with `schedule` and `odometry`; its
   `session`, the control loop; its `mission`, from the first word to the `log`.
 - `guardian`, `keyboard`: what ends a mission, and who stops the robot.

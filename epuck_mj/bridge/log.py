@@ -28,7 +28,7 @@ def log_name(name: Path | None) -> Path:
         name = name.with_suffix("")
     if not name.name:
         raise UserError(f"expected --log with the name of a file, got '{name}'")
-    with writing(name.parent):
+    with writing():
         name.parent.mkdir(parents=True, exist_ok=True)
     for path in _files(name):
         check_writable(path)

@@ -1,4 +1,4 @@
-"""The ports of this machine, which may fail at any time. The only `import serial`."""
+"""Ports of pyserial, which may fail at any time. The only `import serial`."""
 
 import errno
 

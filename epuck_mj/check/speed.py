@@ -8,7 +8,8 @@ import numpy as np
 
 from epuck_mj.check.findings import Finding, Place, info, warning
 from epuck_mj.control import TaskParameters, control_step
-from epuck_mj.model import TIMESTEP, Scene
+from epuck_mj.interface import TIMESTEP
+from epuck_mj.model import Scene
 from epuck_mj.sensors import observe
 from epuck_mj.simulation import SimulatedRobots
 from epuck_mj.wall_follower import WallFollower

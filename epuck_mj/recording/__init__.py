@@ -82,7 +82,7 @@ def save_recording(
     # rerun only warns when it is switched off
     if not content:
         raise UserError(f"cannot write '{path}': rerun is off, see RERUN")
-    with writing(Path(path)):
+    with writing():
         write_bytes(Path(path), content)
 
 

@@ -140,7 +140,7 @@ def _keep(job: Job, found: Mapping[str, bytes]) -> None:
     # begun with the first two, the run could be gone on with; the last says it need not
     last = directory.provenance.name
     middle = [name for name in found if name not in (*first, last)]
-    with directory.locked(PATIENCE), files.writing(directory.path):
+    with directory.locked(PATIENCE), files.writing():
         # somebody else may have been there meanwhile
         _refuse_foreign(directory, job)
         if not directory.finished:

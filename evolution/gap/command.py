@@ -74,7 +74,7 @@ def gap(argv: Sequence[str]) -> int:
     policies = [found for path in options.paths for found in named_policies(path)]
     places = worlds(options.worlds)
     robots = [options.robot] if options.robot else [PLANAR_ROBOT, WHEELED_ROBOT]
-    with writing(options.output):
+    with writing():
         options.output.mkdir(parents=True, exist_ok=True)
     check_writable(options.output / "gap.md")
     measured = {robot: _measured(policies, places, robot, options) for robot in robots}
@@ -134,7 +134,7 @@ def _write(
             for robot, outcomes in measured.items()
         },
     }
-    with writing(folder):
+    with writing():
         write_text(folder / "gap.json", json.dumps(record, indent=1) + "\n")
         write_text(folder / "gap.csv", _rows(policies, places, transfers))
         names = [policy.name for policy in policies]

@@ -219,7 +219,7 @@ def _open(recording: Path) -> None:
 
 def _make_folder(path: Path) -> None:
     """Of a file that is to be written: before the work, not behind it."""
-    with writing(path.parent):
+    with writing():
         path.parent.mkdir(parents=True, exist_ok=True)
 
 

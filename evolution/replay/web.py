@@ -31,7 +31,7 @@ def write_page(folder: Path) -> None:
         UserError: if that is not possible.
     """
     here = Path(__file__).parent
-    with files.writing(folder):
+    with files.writing():
         for name, content in _viewer().items():
             files.write_bytes(folder / name, content)
         files.write_bytes(folder / "index.html", (here / "page.html").read_bytes())

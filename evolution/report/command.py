@@ -60,7 +60,7 @@ def report(argv: Sequence[str]) -> int:
     options = parse(Options, f"python -m {MODULE}", argv)
     data = load_study(options.study)
     output = options.output or options.study / "report"
-    with files.writing(output):
+    with files.writing():
         (output / FIGURES).mkdir(parents=True, exist_ok=True)
         pictures, lacking = draw(data, output)
         if not data.yardstick:

@@ -61,7 +61,7 @@ class Journal:
             UserError: if that is not possible.
         """
         arrays = {name: np.array(rows) for name, rows in vars(self).items()}
-        with writing(path.parent):
+        with writing():
             write_arrays(path, {"timestep": np.array(timestep), **arrays})
 
 

@@ -64,7 +64,7 @@ class VirtualTime:
 
 
 class VirtualPort:
-    """Where a host meets a robot in virtual time; see `link.Port`."""
+    """Where a host meets a robot in virtual time; see `connection.Port`."""
 
     def __init__(self, time: VirtualTime) -> None:
         """Open it.

@@ -73,5 +73,5 @@ def save(figure: Figure, folder: Path, name: str) -> None:
         with matplotlib.rc_context(PRINT):
             figure.savefig(content, format=form, dpi=200, metadata=dict(metadata))
         path = folder / f"{name}.{form}"
-        with writing(path):
+        with writing():
             write_bytes(path, content.getvalue())
