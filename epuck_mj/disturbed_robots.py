@@ -24,6 +24,8 @@ def disturbed(
         control_step: its duration [s].
     """
     if disturbances is None:
+        # nothing is left of those before
+        robots.disembody()
         return robots
     return DisturbedRobots(robots, disturbances, control_step)
 

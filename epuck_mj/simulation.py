@@ -96,6 +96,12 @@ class SimulatedRobots:
         # what the contact solver has worked out from them
         self._batch.set_const(np.arange(n, dtype=np.int32))
 
+    def disembody(self) -> None:
+        """Give the robots the scene's body back, from the next reset on."""
+        if self._embodied:
+            self.embody(np.ones(self.capacity), np.ones(self.capacity))
+            self._embodied = False
+
     def keep(self, mask: np.ndarray) -> None:
         """Go on with the active robots that `mask` `(active,)` names."""
         self._active = self._active[mask]

@@ -176,7 +176,11 @@ class Experiment:
             ValueError: if it does not belong to this experiment.
         """
         prefix = "optimizer."
-        records, genomes = (self._array(state, name) for name in ARRAYS)
+        rows, genomes = (self._array(state, name) for name in ARRAYS)
+        records = [
+            Record(int(index), int(spent), best, mean, std, int(steps), crashed)
+            for index, spent, best, mean, std, steps, crashed in rows.tolist()
+        ]
         self.optimizer.restore(
             {
                 name.removeprefix(prefix): array
@@ -184,10 +188,7 @@ class Experiment:
                 if name.startswith(prefix)
             }
         )
-        self.records = [
-            Record(int(index), int(spent), best, mean, std, int(steps), crashed)
-            for index, spent, best, mean, std, steps, crashed in records.tolist()
-        ]
+        self.records = records
         self.best_genomes = list(genomes)
 
     def _array(self, state: Mapping[str, np.ndarray], name: str) -> np.ndarray:
@@ -200,6 +201,8 @@ class Experiment:
             raise ValueError(
                 f"expected an array '{name}' of shape {expected}, got {got}"
             )
+        if not np.isfinite(array).all():
+            raise ValueError(f"expected an array '{name}' of finite numbers")
         return array
 
     def history(self) -> str:

@@ -90,6 +90,9 @@ def generations(job: Job, means: Means) -> Generator[int]:
     with directory.locked(PATIENCE):
         if directory.config.exists():
             directory.refuse_other_config(job.config)
+        # another process may have done it since the jobs were listed
+        if directory.finished:
+            return
         run = Run(job.config, directory, means, job.argv)
         if directory.config.exists():
             run.resume()

@@ -10,6 +10,7 @@ import queue
 import socket
 import sys
 import time
+import traceback
 from contextlib import suppress
 from multiprocessing.process import parent_process
 from typing import Any, Self
@@ -113,6 +114,22 @@ def viewer_there(port: int) -> bool:
 
 def _show(config: ExperimentConfig, port: int, generations: Any) -> None:
     """What the viewer's process does."""
+    try:
+        _follow(config, port, generations)
+    except ConnectionError:
+        print("The viewer has gone; the run goes on", file=sys.stderr)
+    except Exception:
+        traceback.print_exc()
+    # rerun would wait for a viewer that has gone
+    os._exit(0)
+
+
+def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
+    """Show generations until the run has ended.
+
+    Raises:
+        ConnectionError: if the viewer has gone, or takes nothing.
+    """
     # rerun is loaded by those who use it
     from epuck_mj.recording.live import LiveView
 
@@ -125,8 +142,7 @@ def _show(config: ExperimentConfig, port: int, generations: Any) -> None:
     while batch := _next(generations):
         waited_for = [generation for generation in batch if generation is not None]
         if not viewer_there(port):
-            print("The viewer has gone; the run goes on", file=sys.stderr)
-            break
+            raise ConnectionError
         if waited_for:
             records, genomes = zip(*waited_for, strict=True)
             _add(view, records)
@@ -145,10 +161,8 @@ def _show(config: ExperimentConfig, port: int, generations: Any) -> None:
             view.flush()
         if None in batch:
             view.close()
-            break
+            return
         time.sleep(PAUSE)
-    # rerun would wait for a viewer that has gone
-    os._exit(0)
 
 
 def _next(generations: Any) -> list[Generation | None]:

@@ -56,8 +56,14 @@ def reproduce(argv: Sequence[str]) -> int:
     options = parse(Options, f"python -m {MODULE}", argv)
     if [options.quick, options.full, options.study is not None].count(True) > 1:
         raise UserError("expected one of --quick, --full and --study")
-    if options.wheels is not None and options.study is None:
-        raise UserError("expected --study with --wheels")
+    if options.wheels is not None:
+        if options.study is None:
+            raise UserError("expected --study with --wheels")
+        if options.wheels.name == options.study.name:
+            raise UserError(
+                f"expected studies in folders of different names, got "
+                f"'{options.study}' and '{options.wheels}'"
+            )
     if options.study is not None:
         places, failed = [options.study, options.wheels], 0
     else:

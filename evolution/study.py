@@ -71,6 +71,11 @@ def study(argv: Sequence[str]) -> int:
         raise UserError("expected --cluster with --split: what to send evaluations to")
     if options.jobs and options.cluster is not None:
         raise UserError("expected --jobs or --cluster, got both: workers do the jobs")
+    if options.cluster is not None:
+        # an extra
+        from evolution.cluster import check_address
+
+        check_address(options.cluster)
     seeds = parse_seeds(options.seeds)
     config = StudyConfig.load(find_study(options.study))
     if options.experiments is not None:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,11 +20,12 @@ import yaml
 from distributed import Client
 
 from epuck_mj.errors import UserError
-from evolution.cluster import carry_out_on_cluster, connection, world
+from evolution.cluster import carry_out_on_cluster, connection, requirements
 from evolution.config import ExperimentConfig
 from evolution.config_files import find_config, load_config
 from evolution.execution import Means
 from evolution.jobs import Event, Job, carry_out, generations
+from evolution.study import study
 
 pytestmark = pytest.mark.slow
 
@@ -304,7 +306,7 @@ def test_what_was_begun_is_gone_on_with(fleet, references, tmp_path):
 def test_a_worker_of_other_versions_refuses(split, fleet, tmp_path, monkeypatch):
     address = fleet.start(1)
     monkeypatch.setattr(
-        world, "version", lambda name: "9.9" if name == "mujoco" else "0.1.0"
+        requirements, "version", lambda name: "9.9" if name == "mujoco" else "0.1.0"
     )
     todo = jobs(tmp_path, config("ga", 1, **SMALL))
     (event,) = carry_out_on_cluster(todo, address, split, racing=True)
@@ -312,6 +314,15 @@ def test_a_worker_of_other_versions_refuses(split, fleet, tmp_path, monkeypatch)
     assert "mujoco (there 3." in str(event.failure)
     assert "here 9.9)" in str(event.failure)
     assert "\n" not in str(event.failure)
+
+
+def test_a_worker_of_other_code_refuses(monkeypatch):
+    asked = requirements.Requirements.here("epuck_planar", "arena", 0.1)
+    assert ("code of epuck-mj", requirements.code()) in asked.facts
+    monkeypatch.setattr(requirements, "code", lambda: "edited")
+    monkeypatch.setattr(requirements, "get_worker", lambda: SimpleNamespace(address=7))
+    with pytest.raises(UserError, match=r"differ: code of epuck-mj \(there edited, "):
+        asked.refuse_another()
 
 
 def test_split_runs_are_as_here_though_a_worker_is_killed(fleet, references, tmp_path):
@@ -396,10 +407,12 @@ def test_nobody_or_a_stranger_at_the_address(tmp_path, monkeypatch):
         "tcp:/",
     ],
 )
-def test_what_is_no_address_is_refused(address, tmp_path):
-    message = refusal(address, tmp_path)
-    assert "expected as cluster tcp://host:8786" in message
-    assert message.endswith(f"got '{address}'")
+def test_what_is_no_address_is_refused_before_anything_is_written(address, tmp_path):
+    output = tmp_path / "study"
+    with pytest.raises(UserError, match="expected as cluster tcp://host:8786") as info:
+        study(["quick", "--cluster", address, "--output", str(output)])
+    assert str(info.value).endswith(f"got '{address}'")
+    assert not output.exists()
 
 
 def test_nothing_to_do_needs_no_cluster():

@@ -189,6 +189,22 @@ def test_bodies_are_heavier_and_slide():
     np.testing.assert_array_equal(mass, [model.body_mass] * 2)
 
 
+@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
+def test_ideal_robots_have_nothing_of_the_disturbed_ones_before_them(robot):
+    engine = BatchEngine(load_scene(robot, "arena", TASK.control_step), TASK, 1)
+    met, population = drawn(3, ranges=RANGES), genomes(5)
+
+    def trials(disturbances):
+        return evaluate(
+            engine, Network(), population, STARTS, disturbances=disturbances
+        ).trial_fitness
+
+    ideal, disturbed = trials(None), trials(met)
+    assert (ideal != disturbed).any()
+    np.testing.assert_array_equal(trials(None), ideal)
+    np.testing.assert_array_equal(trials(met), disturbed)
+
+
 @pytest.mark.parametrize("ranges", [BOOK, RANGES], ids=["book", "randomised"])
 def test_threads_chunks_and_company_change_nothing(scene, ranges, monkeypatch):
     met, population = drawn(3, ranges=ranges), genomes(7)

@@ -309,6 +309,7 @@ def after_two():
         ("records", np.zeros(3)),
         ("records", np.zeros((2, 3))),
         ("records", np.zeros((0,))),
+        ("records", np.full((2, 7), np.inf)),
         ("best_genomes", np.zeros(())),
         ("best_genomes", np.zeros((2, 3))),
         ("best_genomes", np.zeros((1, 40))),

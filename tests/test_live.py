@@ -135,7 +135,7 @@ def test_without_a_viewer_one_line_and_no_directory(monkeypatch, tmp_path):
 
 
 @pytest.mark.slow
-def test_somebody_else_at_the_port_does_not_stop_a_run(monkeypatch, tmp_path):
+def test_somebody_else_at_the_port_does_not_stop_a_run(monkeypatch, tmp_path, capfd):
     """It accepts, and then says nothing at all."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
         monkeypatch.setattr(live, "PORT", listener.getsockname()[1])
@@ -144,3 +144,4 @@ def test_somebody_else_at_the_port_does_not_stop_a_run(monkeypatch, tmp_path):
         assert run([*ARGUMENTS, "--output", str(output), "--live"]) == 0
         assert RunDirectory(output).finished
         assert time.monotonic() - before < 60
+    assert "Traceback" not in capfd.readouterr().err

@@ -68,6 +68,7 @@ def test_one_command_runs_reports_and_judges_and_goes_on(here, capfd):
         (["--full", "--study", "x"], "expected one of --quick, --full and --study"),
         (["--wheels", "x"], "expected --study with --wheels"),
         (["--study", "nowhere"], "'nowhere' is not a study"),
+        (["--study", "a/x", "--wheels", "b/x"], "expected studies in folders of diff"),
     ],
 )
 def test_bad_input(here, arguments, message):

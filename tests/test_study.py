@@ -251,6 +251,10 @@ def test_what_is_done_is_skipped(finished, carried, capsys):
     before = written(finished / "one") | written(finished / "two")
     assert study(["mine.yaml", "--seeds", "1-2", "--output", "out"]) == 0
     assert carried.jobs == []
+    # neither by who believes that it is not done yet
+    path = finished / "one" / "seed-1"
+    job = Job("one", load_config(path / "config.yaml"), path, ())
+    carry_out(job, Means(), lambda _: pytest.fail("it was done again"))
     assert written(finished / "one") | written(finished / "two") == before
     first, summary, _ = capsys.readouterr().out.splitlines()
     assert first == "4 of 4 runs were finished already"

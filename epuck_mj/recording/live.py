@@ -120,9 +120,12 @@ class LiveView:
         """Wait until the viewer has everything.
 
         Raises:
-            RuntimeError: if it does not take it.
+            ConnectionError: if it does not take it.
         """
-        self._stream.flush(timeout_sec=PATIENCE)
+        try:
+            self._stream.flush(timeout_sec=PATIENCE)
+        except RuntimeError as error:
+            raise ConnectionError(str(error)) from None
 
     def close(self) -> None:
         """Let go of the viewer, which keeps what it has; this may wait for it."""

@@ -8,7 +8,7 @@ from contextlib import closing
 from epuck_mj.control import TaskParameters, Trials
 from epuck_mj.model import load_scene
 from evolution.cluster.connection import Cluster, ClusterLost
-from evolution.cluster.world import World, world_of
+from evolution.cluster.requirements import Requirements, requirements_of
 from evolution.config import ExperimentConfig
 from evolution.evaluation import CAPACITY, BatchEngine, Work, joined
 from evolution.execution import Means
@@ -48,7 +48,7 @@ class ClusterEngine:
             UserError: if robot or arena cannot be used.
         """
         self._cluster = cluster
-        self._world = world_of(config)
+        self._required = requirements_of(config)
         self._task = config.task
 
     def __str__(self) -> str:
@@ -64,23 +64,23 @@ class ClusterEngine:
         n_chunks = CHUNKS_PER_THREAD * max(1, self._cluster.n_threads())
         most = min(CAPACITY, math.ceil(len(work) / n_chunks))
         futures = [
-            self._cluster.submit("trials", _trials, self._world, self._task, part)
+            self._cluster.submit("trials", _trials, self._required, self._task, part)
             for part in work.chunks(most)
         ]
         return joined(self._cluster.results(futures))
 
 
-def _trials(world: World, task: TaskParameters, part: Work) -> Trials:
+def _trials(required: Requirements, task: TaskParameters, part: Work) -> Trials:
     """On a worker: `Engine.run` of a part of the work."""
     # a thread's own: an engine runs one batch at a time
     engines = _kept.__dict__.setdefault("engines", {})
-    if (world, task) not in engines:
-        world.refuse_another()
+    if (required, task) not in engines:
+        required.refuse_another()
         if len(engines) == ENGINES_KEPT:
             engines.clear()
-        scene = load_scene(world.robot, world.arena, world.control_step)
-        engines[world, task] = BatchEngine(scene, task, threads=1)
-    return engines[world, task].run(part)
+        scene = load_scene(required.robot, required.arena, required.control_step)
+        engines[required, task] = BatchEngine(scene, task, threads=1)
+    return engines[required, task].run(part)
 
 
 _kept = threading.local()

@@ -13,7 +13,7 @@ from distributed import Future, get_worker
 from epuck_mj import files
 from epuck_mj.errors import UserError
 from evolution.cluster.connection import LOOK_AFTER, Cluster, ClusterLost
-from evolution.cluster.world import World, world_of
+from evolution.cluster.requirements import Requirements, requirements_of
 from evolution.execution import Means
 from evolution.jobs import PATIENCE, Event, Job, carry_out, failure_log, failure_of
 from evolution.run_directory import RunDirectory
@@ -70,7 +70,7 @@ def _sent(job: Job, cluster: Cluster, racing: bool) -> Future:
             if path.exists()
         }
     name = f"{job.name}-seed-{job.config.seed}"
-    return cluster.submit(name, _run, job, begun, racing, world_of(job.config))
+    return cluster.submit(name, _run, job, begun, racing, requirements_of(job.config))
 
 
 def _refuse_foreign(directory: RunDirectory, job: Job) -> None:
@@ -86,7 +86,7 @@ def _refuse_foreign(directory: RunDirectory, job: Job) -> None:
 
 
 def _run(
-    job: Job, begun: Mapping[str, bytes], racing: bool, world: World
+    job: Job, begun: Mapping[str, bytes], racing: bool, required: Requirements
 ) -> dict[str, bytes]:
     """On a worker: the files of a run, by name, from those `begun` on.
 
@@ -97,7 +97,7 @@ def _run(
     # files are written with the process's umask: one run at a time
     with _running, TemporaryDirectory(dir=worker.local_directory) as folder:
         _stop_if_unwanted()
-        world.refuse_another()
+        required.refuse_another()
         path = Path(folder)
         for name, content in begun.items():
             files.write_bytes(path / name, content)

@@ -1,11 +1,16 @@
 """What has to be the same on a worker as here, or its bits would be others."""
 
+import hashlib
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import version
+from pathlib import Path
 from typing import Self
 
 from distributed import get_worker
 
+import epuck_mj
+import evolution
 from epuck_mj.errors import UserError
 from epuck_mj.model import load_scene
 from evolution.config import ExperimentConfig
@@ -16,7 +21,7 @@ DECIDING = ("epuck-mj", "mujoco", "numpy", "scipy", "contourpy", "cmaes")
 
 
 @dataclass(frozen=True)
-class World:
+class Requirements:
     """What decides over the bits of a trial, but for controller, start and task.
 
     Attributes:
@@ -39,6 +44,7 @@ class World:
             UserError: if robot or arena cannot be used.
         """
         facts = {package: version(package) for package in DECIDING}
+        facts["code of epuck-mj"] = code()
         for name in (robot, WHEELED_ROBOT):
             scene = load_scene(name, arena, control_step)
             for part, sha256 in scene.sha256.items():
@@ -51,7 +57,7 @@ class World:
         Raises:
             UserError: naming what differs.
         """
-        here = World.here(self.robot, self.arena, self.control_step)
+        here = Requirements.here(self.robot, self.arena, self.control_step)
         ours, theirs = dict(here.facts), dict(self.facts)
         differing = [
             f"{name} (there {ours.get(name)}, here {theirs.get(name)})"
@@ -65,10 +71,22 @@ class World:
             )
 
 
-def world_of(config: ExperimentConfig) -> World:
-    """The world of a run, as it is on this machine.
+@cache
+def code() -> str:
+    """First digits of a hash of this project's Python, of which no version tells."""
+    digest = hashlib.sha256()
+    for package in (epuck_mj, evolution):
+        root = Path(str(package.__file__)).parent
+        for path in sorted(root.rglob("*.py")):
+            digest.update(path.relative_to(root).as_posix().encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def requirements_of(config: ExperimentConfig) -> Requirements:
+    """What a run requires, as it is on this machine.
 
     Raises:
         UserError: if robot or arena cannot be used.
     """
-    return World.here(config.robot, config.arena, config.control_step)
+    return Requirements.here(config.robot, config.arena, config.control_step)
