@@ -8,6 +8,7 @@ be trusted: their bounds are nan. The same generator gives the same bounds.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -17,6 +18,9 @@ FEWEST_FOR_INTERVAL = 5
 
 Of 3, bounds said to hold the truth in 95 % hold it in 90; of 2, in 66.
 """
+
+FEWEST_FOR_RANKS = 5
+"""Pairs below which a rank correlation says nothing: of 4, any order is common."""
 
 RESAMPLES = 2000
 """Of each bootstrap."""
@@ -153,3 +157,11 @@ def bootstrap(
         rng=rng,
     ).confidence_interval
     return float(interval.low), float(interval.high)
+
+
+def rank_correlation(a: np.ndarray, b: np.ndarray) -> float | None:
+    """Spearman's of `(n,)` and `(n,)`; None of fewer than 5 pairs or equal values."""
+    if a.size < FEWEST_FOR_RANKS or np.ptp(a) == 0 or np.ptp(b) == 0:
+        return None
+    result: Any = stats.spearmanr(a, b)
+    return float(result.statistic)

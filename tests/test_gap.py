@@ -2,7 +2,7 @@
 
 import csv
 import json
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +12,12 @@ from matplotlib.image import imread
 from epuck_mj.constants import TRACK, WHEEL_RADIUS
 from epuck_mj.control import TaskParameters
 from epuck_mj.errors import UserError
+from epuck_mj.motors import Speeds
 from epuck_mj.wall_follower import WallFollower
 from evolution.gap import worlds as gap_worlds
 from evolution.gap.command import gap
 from evolution.gap.document import document
+from evolution.gap.groups import experiments, peers
 from evolution.gap.measure import Outcome, abroad, ideal
 from evolution.gap.transfer import (
     Transfer,
@@ -168,27 +170,74 @@ def test_shares_and_mastered_worlds():
 
 
 def test_rank_correlations_of_hand_made_worlds():
-    found = rank_correlations(TRANSFER)
+    home = np.array([5.0, 4.0, 3.0, 2.0, 1.0])
+    worlds = np.array([home * 2, home**2, [1, 2, 3, 5, 4], np.ones(5)])
+    # a sixth is slower, and best everywhere
+    all_home = np.append(home, 0.0)
+    abroad = np.column_stack([worlds, np.full(4, 99.0)])
+    transfer = Transfer(all_home, abroad, abroad, abroad)
+    fast = range(5)
+    found = rank_correlations(transfer, fast)
     assert found is not None
     # as home, as home, another order; the fourth says nothing
-    third = np.corrcoef([3, 2, 1], [1, 3, 2])[0, 1]
+    third = np.corrcoef(home, [1, 2, 3, 5, 4])[0, 1]
     np.testing.assert_allclose(found["home"], (1 + 1 + third) / 3)
     np.testing.assert_allclose(found["worlds"], (1 + third + third) / 3)
-    assert between_robots(TRANSFER, TRANSFER) == pytest.approx(1)
-    two = Transfer(np.ones(2), *[np.ones((3, 2))] * 3)
-    assert rank_correlations(two) is between_robots(two, two) is None
+    assert between_robots(transfer, transfer, fast) == pytest.approx(1)
+    mixed = rank_correlations(transfer, range(6))
+    assert mixed is not None
+    assert mixed["home"] < found["home"]
+    for few in (range(4), [5]):
+        assert rank_correlations(transfer, few) is None
+        assert between_robots(transfer, transfer, few) is None
+    alike = Transfer(np.ones(5), *[np.ones((3, 5))] * 3)
+    assert rank_correlations(alike, fast) is between_robots(alike, alike, fast) is None
+
+
+def test_policies_are_grouped_by_experiment_and_by_speed():
+    slow = TaskParameters(speeds=Speeds(0.04))
+    policies = [
+        NamedPolicy("runs/paper/de-best/seed-1", WallFollower(), TaskParameters()),
+        NamedPolicy("runs/paper/de-best/seed-2", WallFollower(), slow),
+        NamedPolicy("runs/wheels/de-best/seed-1", WallFollower(), TaskParameters()),
+        NamedPolicy("runs/paper/ga/seed-1", WallFollower(), slow),
+        NamedPolicy("a/champion.json", WallFollower(), TaskParameters()),
+        NamedPolicy("b/champion.json", WallFollower(), TaskParameters()),
+        FOLLOWER,
+    ]
+    assert experiments(policies) == {
+        "runs/paper/de-best": [0, 1],
+        "runs/wheels/de-best": [2],
+        "ga": [3],
+        "a/champion.json": [4],
+        "b/champion.json": [5],
+        "wall-follower": [6],
+    }
+    assert peers(policies) == {"0.129 m/s": [0, 2, 4, 5, 6], "0.04 m/s": [1, 3]}
 
 
 def test_the_document_says_who_kept_what():
     names = ["a/seed-1", "a/seed-2", "b"]
     groups = {"a": [0, 1], "b": [2]}
-    text = to_markdown(document(names, {"epuck": TRANSFER}, groups, 5, LATENCY))
+    transfers, peers_of = {"epuck": TRANSFER}, {"0.1 m/s": [0, 1, 2]}
+    text = to_markdown(document(names, transfers, groups, peers_of, 5, LATENCY))
     assert "3 policies, frozen, in 4 worlds" in text
     assert "| a | a/seed-1 | 0.500 |" in text
     assert "50% [15%, 85%]" in text
     # kept 70.5 % and 81.25 %, mastered 50 % and 25 %
     assert "| a | epuck | 2 | 0.450 | 76% | 0.2 | 38% | 38% |" in text
-    assert "Rank correlation" in text
+    # of three policies, ranks say nothing
+    assert "Ranks" not in text
+    members = [0, 1, 2, 0, 1]
+    more = Transfer(
+        *(getattr(TRANSFER, f.name)[..., members] for f in fields(TRANSFER))
+    )
+    both = {"epuck": more, "epuck_planar": more}
+    ranked = to_markdown(
+        document(list("abcde"), both, groups, {"0.1 m/s": range(5)}, 5, LATENCY)
+    )
+    assert "- 5 policies of 0.1 m/s, epuck: between home and a world, " in ranked
+    assert "by mean fitness over the worlds, 1.00" in ranked
     # late in the second and the third world: shares 0.82, 0.4 and 0.5, 1
     assert "| experiment | robot | n | 0 | 2 |" in text
     assert "| a | epuck | 2 | 84% | 68% |" in text

@@ -32,11 +32,12 @@ from evolution.report.blocks import (
 from evolution.report.command import report, tables
 from evolution.report.findings import held_out_fitness
 from evolution.report.pairs import compared, pair_rows
-from evolution.report.samples import TARGET_SHARES, rank_correlation
+from evolution.report.samples import TARGET_SHARES
 from evolution.report.successes import BEATS, FOLLOWS, success_rows
 from evolution.report.summary import summary, summary_text
 from evolution.report.tables import csv_text, run_rows, target_rows
 from evolution.report.words import spread
+from evolution.statistics import rank_correlation
 from evolution.study_config import seeds_text
 from evolution.study_data import load_study
 from tests.study_on_disk import LEVELS, ROBOTS, history, write_study

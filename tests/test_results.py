@@ -2,12 +2,19 @@
 
 import hashlib
 import json
+from operator import itemgetter
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks.publish import shipped, with_tables
 from epuck_mj.mjcf import MODELS
+from evolution.gap.document import document, summary
+from evolution.gap.groups import experiments, peers
+from evolution.gap.transfer import Transfer
+from evolution.named_policies import named_policies
+from evolution.report.blocks import to_markdown
 from evolution.study_config import StudyConfig, find_study
 from evolution.study_data import load_study
 from evolution.verify import verify
@@ -75,3 +82,31 @@ def test_the_readme_shows_what_is_shipped():
 
 def test_what_is_shipped_is_small():
     assert sum(p.stat().st_size for p in RESULTS.rglob("*") if p.is_file()) < SIZE_MAX
+
+
+def test_the_gap_s_documents_say_what_was_measured(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    record = json.loads((RESULTS / "gap" / "gap.json").read_text())
+    transfers = {}
+    for robot, each in record["robots"].items():
+        home = np.array([policy["home"] for policy in each.values()])
+        ideal, fitness, collisions = (
+            np.array(
+                [[key(world) for world in policy[field]] for policy in each.values()]
+            ).T
+            for field, key in (
+                ("ideal", float),
+                ("abroad", itemgetter("fitness")),
+                ("abroad", itemgetter("collisions_per_minute")),
+            )
+        )
+        reference = np.maximum(home, ideal)
+        transfers[robot] = Transfer(home, reference, fitness, collisions)
+    names = list(next(iter(record["robots"].values())))
+    policies = [policy for name in names for policy in named_policies(name)]
+    groups, of_one_speed = experiments(policies), peers(policies)
+    latency = np.array([world["latency"] for world in record["worlds"]])
+    blocks = document(names, transfers, groups, of_one_speed, record["starts"], latency)
+    assert (RESULTS / "gap" / "gap.md").read_text() == to_markdown(blocks)
+    table = to_markdown([summary(transfers, groups)])
+    assert (RESULTS / "gap" / "summary.md").read_text() == table

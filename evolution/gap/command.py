@@ -1,11 +1,9 @@
 """The command line of the gap: who is tested, where, and what is written."""
 
-import csv
-import io
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,16 +15,15 @@ from epuck_mj.errors import UserError
 from epuck_mj.files import check_writable, write_text, writing
 from evolution.gap.document import document, summary
 from evolution.gap.figure import kept_figure
+from evolution.gap.groups import experiments, peers
 from evolution.gap.measure import Outcome, abroad, ideal
-from evolution.gap.transfer import (
-    Transfer,
-    verdict,
-)
+from evolution.gap.transfer import Transfer, verdict
 from evolution.gap.worlds import World, worlds
 from evolution.held_out import PLANAR_ROBOT, WHEELED_ROBOT
 from evolution.named_policies import NamedPolicy, named_policies
 from evolution.report.blocks import to_markdown
 from evolution.report.figures import save
+from evolution.report.tables import csv_text
 
 MODULE = "evolution.gap"
 WORLDS_MAX, STARTS_MAX = 1000, 1000
@@ -71,7 +68,9 @@ def gap(argv: Sequence[str]) -> int:
         raise UserError(
             "expected run or study directories, controller files, or wall-follower"
         )
-    policies = [found for path in options.paths for found in named_policies(path)]
+    policies = [
+        found for path in dict.fromkeys(options.paths) for found in named_policies(path)
+    ]
     places = worlds(options.worlds)
     robots = [options.robot] if options.robot else [PLANAR_ROBOT, WHEELED_ROBOT]
     with writing():
@@ -118,7 +117,7 @@ def _write(
     options: Options,
 ) -> None:
     transfers = {robot: Transfer.of(*outcomes) for robot, outcomes in measured.items()}
-    groups = _groups(policies)
+    groups = experiments(policies)
     record = {
         "worlds": [asdict(world) for world in places],
         "starts": options.starts,
@@ -139,21 +138,13 @@ def _write(
         write_text(folder / "gap.csv", _rows(policies, places, transfers))
         names = [policy.name for policy in policies]
         latency = np.array([place.latency for place in places])
-        blocks = document(names, transfers, groups, options.starts, latency)
+        blocks = document(
+            names, transfers, groups, peers(policies), options.starts, latency
+        )
         write_text(folder / "gap.md", to_markdown(blocks))
         table = to_markdown([summary(transfers, groups)])
         write_text(folder / "summary.md", table)
     save(kept_figure(transfers, groups), folder, "gap")
-
-
-def _groups(policies: Sequence[NamedPolicy]) -> dict[str, list[int]]:
-    """Runs of one experiment together, by name."""
-    groups: dict[str, list[int]] = {}
-    for i, policy in enumerate(policies):
-        path = Path(policy.source)
-        seed = path.name.startswith("seed-")
-        groups.setdefault(path.parent.name if seed else path.name, []).append(i)
-    return groups
 
 
 def _rows(
@@ -162,25 +153,17 @@ def _rows(
     transfers: dict[str, Transfer],
 ) -> str:
     """A row per robot, policy and world."""
-    keys = [field.name for field in fields(World)]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
-        ["robot", "policy", "world", "share", "collisions_per_minute", *keys]
-    )
-    for robot, transfer in transfers.items():
-        for i, policy in enumerate(policies):
-            for j, world in enumerate(places):
-                share, collisions = transfer.share[j, i], transfer.collisions[j, i]
-                values = asdict(world).values()
-                writer.writerow(
-                    [
-                        robot,
-                        policy.name,
-                        j,
-                        f"{share:.4f}",
-                        f"{collisions:.4f}",
-                        *values,
-                    ]
-                )
-    return text.getvalue()
+    rows = [
+        {
+            "robot": robot,
+            "policy": policy.name,
+            "world": j,
+            "share": f"{transfer.share[j, i]:.4f}",
+            "collisions_per_minute": f"{transfer.collisions[j, i]:.4f}",
+            **asdict(world),
+        }
+        for robot, transfer in transfers.items()
+        for i, policy in enumerate(policies)
+        for j, world in enumerate(places)
+    ]
+    return csv_text(list(rows[0]), rows)

@@ -98,6 +98,7 @@ def document(
     names: Sequence[str],
     transfers: Mapping[str, Transfer],
     groups: Mapping[str, Sequence[int]],
+    peers: Mapping[str, Sequence[int]],
     starts: int,
     latency: np.ndarray,
 ) -> list[Block]:
@@ -107,6 +108,7 @@ def document(
         names: of the policies.
         transfers: by robot, at least one.
         groups: indices of the policies of each experiment.
+        peers: of each speed.
         starts: of each world, and at home.
         latency: of each world, in control steps, `(w,)`.
     """
@@ -140,20 +142,41 @@ def document(
             for i in members
         ]
         blocks += [Heading(robot), Table(COLUMNS, rows, texts=2)]
-        ranks = rank_correlations(transfer)
-        if ranks is not None:
-            items = [
-                "Rank correlation of the policies (Spearman) between home and a world, "
-                f"mean over the worlds: {ranks['home']:.2f}",
-                f"Between two worlds, mean over all pairs: {ranks['worlds']:.2f}",
-            ]
-            blocks.append(Listing(items))
-    if len(transfers) == 2:
-        correlation = between_robots(*transfers.values())
-        if correlation is not None:
-            text = "Between the two robots, by mean fitness over the worlds: "
-            blocks.append(Paragraph(f"{text}{correlation:.2f}"))
-    return blocks
+    return [*blocks, *_ranks(transfers, peers)]
+
+
+def _ranks(
+    transfers: Mapping[str, Transfer], peers: Mapping[str, Sequence[int]]
+) -> list[Block]:
+    """How ranks agree; nothing of too few policies."""
+    items = []
+    for speed, members in peers.items():
+        for robot, transfer in transfers.items():
+            found = rank_correlations(transfer, members)
+            if found is not None:
+                items.append(
+                    f"{len(members)} policies of {speed}, {robot}: between home and a "
+                    f"world, mean over the worlds, {found['home']:.2f}; between two "
+                    f"worlds, mean over all pairs, {found['worlds']:.2f}"
+                )
+        if len(transfers) == 2:
+            one, other = transfers.values()
+            agreed = between_robots(one, other, members)
+            if agreed is not None:
+                items.append(
+                    f"{len(members)} policies of {speed}: between the two robots, by "
+                    f"mean fitness over the worlds, {agreed:.2f}"
+                )
+    if not items:
+        return []
+    return [
+        Heading("Ranks"),
+        Paragraph(
+            "Rank correlations (Spearman) of fitness, among policies of one full speed "
+            "only: a slower one earns less at home and keeps more of it anywhere."
+        ),
+        Listing(items),
+    ]
 
 
 def _cells(found: Verdict) -> list[str]:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from epuck_mj.colors import TRIALS, fraction
 from evolution.gap.transfer import SHARE_KEPT, Transfer
 from evolution.report.figures.style import PAGE, PRINT
-from evolution.report.words import ROBOTS
+from evolution.report.words import robot_name
 
 LINES = ("-", (0, (7, 2)), (0, (2, 1.5)), (0, (7, 1.5, 1.2, 1.5)))
 
@@ -44,12 +44,12 @@ def kept_figure(
                 )
             axes.axvline(SHARE_KEPT, color="0.4", lw=0.8, ls=":")
             axes.set(
-                title=ROBOTS.get(robot, robot),
+                title=robot_name(robot),
                 xlabel="share of the fitness kept, at least",
                 xlim=(0, SHARE_END),
                 ylim=(0, 1),
             )
-        panels[0].set_ylabel("share of worlds")
+        panels[0].set_ylabel("share of policies and worlds")
         figure.legend(
             *panels[0].get_legend_handles_labels(),
             loc="outside lower center",

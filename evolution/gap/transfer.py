@@ -7,7 +7,7 @@ import numpy as np
 from scipy import stats
 
 from evolution.gap.measure import Outcome
-from evolution.statistics import Interval, mean_interval, wilson
+from evolution.statistics import Interval, mean_interval, rank_correlation, wilson
 
 SHARE_KEPT = 0.8
 """Least share of its fitness that a policy keeps in a world it masters."""
@@ -108,41 +108,33 @@ def verdict(transfer: Transfer, policy: int) -> Verdict:
     )
 
 
-def rank_correlations(transfer: Transfer) -> dict[str, float] | None:
-    """Spearman's, of the policies' ranks; None if there are fewer than three.
+def rank_correlations(
+    transfer: Transfer, members: Sequence[int]
+) -> dict[str, float] | None:
+    """Spearman's, of the ranks of some policies; None if they are too few.
 
     `home`: between home and a world, the mean over the worlds. `worlds`: between two
     worlds, the mean over all pairs. Worlds where all fare alike say nothing.
     """
-    if len(transfer.home) < 3:
+    home, fitness = transfer.home[members], transfer.fitness[:, members]
+    own = [rank_correlation(home, world) for world in fitness]
+    told = fitness[np.ptp(fitness, axis=1) > 0]
+    if len(told) < 2 or not any(own):
         return None
-    told = transfer.fitness[np.ptp(transfer.fitness, axis=1) > 0]
-    home = [_spearman(transfer.home, world) for world in told]
-    pairs = [
-        _spearman(one, other) for i, one in enumerate(told) for other in told[i + 1 :]
-    ]
-    return {"home": _mean(home), "worlds": _mean(pairs)}
+    between = np.corrcoef(stats.rankdata(told, axis=1))
+    return {
+        "home": float(np.mean([each for each in own if each is not None])),
+        "worlds": float(between[np.triu_indices(len(told), 1)].mean()),
+    }
 
 
-def between_robots(one: Transfer, other: Transfer) -> float | None:
+def between_robots(
+    one: Transfer, other: Transfer, members: Sequence[int]
+) -> float | None:
     """Spearman's, of the policies' mean fitness over the worlds on two robots."""
-    if len(one.home) < 3:
-        return None
-    return _spearman(one.fitness.mean(axis=0), other.fitness.mean(axis=0))
+    mean, others = (each.fitness.mean(axis=0)[members] for each in (one, other))
+    return rank_correlation(mean, others)
 
 
 def _share(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
     return part / np.maximum(whole, np.finfo(float).tiny)
-
-
-def _spearman(a: np.ndarray, b: np.ndarray) -> float:
-    if np.ptp(a) == 0 or np.ptp(b) == 0:
-        return float("nan")
-    # Pearson's of the ranks
-    ranks = stats.rankdata(a), stats.rankdata(b)
-    return float(np.corrcoef(*ranks)[0, 1])
-
-
-def _mean(values: list[float]) -> float:
-    known = [value for value in values if not np.isnan(value)]
-    return float(np.mean(known)) if known else float("nan")

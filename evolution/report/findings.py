@@ -6,14 +6,12 @@ from epuck_mj.behaviour_classes import HUG, MEANINGS
 from epuck_mj.metrics import FOLLOWING_SHARE
 from evolution.report.blocks import Block, Heading, Listing, Paragraph, Table
 from evolution.report.samples import (
-    FEWEST_FOR_RANKS,
     class_means,
     clearance,
     clearances,
     kept,
     known,
     most_believed,
-    rank_correlation,
     tests_of,
     whole_lap_share,
     whole_laps,
@@ -27,6 +25,7 @@ from evolution.report.words import (
     robot_name,
     spread,
 )
+from evolution.statistics import FEWEST_FOR_RANKS, rank_correlation
 from evolution.study_data import StudyData
 
 

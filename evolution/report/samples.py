@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from evolution.study_data import RunData, StudyData
 from evolution.targets import evaluations_to_target
@@ -16,9 +15,6 @@ TARGET_SHARES: tuple[float, ...] = tuple(
     fitness / 300 for fitness in range(50, 250, 25)
 )
 """Targets as shares of the highest fitness there is: 50, 75, ... 225 of 300."""
-
-FEWEST_FOR_RANKS = 5
-"""Runs below which a rank correlation says nothing: of 4, any order is common."""
 
 
 def tests_of(data: StudyData, name: str, robot: str) -> list[Mapping[str, Any]]:
@@ -116,11 +112,3 @@ def hits(runs: Sequence[RunData], steps: int) -> np.ndarray:
             for run in runs
         ]
     )
-
-
-def rank_correlation(a: np.ndarray, b: np.ndarray) -> float | None:
-    """Spearman's, None of fewer than 5 runs or of equal values."""
-    if a.size < FEWEST_FOR_RANKS or np.ptp(a) == 0 or np.ptp(b) == 0:
-        return None
-    result: Any = stats.spearmanr(a, b)
-    return float(result.statistic)

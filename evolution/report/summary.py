@@ -18,7 +18,6 @@ from evolution.report.samples import (
     kept,
     known,
     most_believed,
-    rank_correlation,
     tests_of,
 )
 from evolution.report.successes import success_rows
@@ -29,7 +28,7 @@ from evolution.report.tables import (
     target_rows,
 )
 from evolution.report.words import command_line, label
-from evolution.statistics import quartiles
+from evolution.statistics import quartiles, rank_correlation
 from evolution.study_data import StudyData
 
 

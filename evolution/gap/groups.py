@@ -1,0 +1,34 @@
+"""Which policies belong together: of one experiment, of one speed."""
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from evolution.named_policies import NamedPolicy
+from evolution.study_directory import PREFIX
+
+
+def experiments(policies: Sequence[NamedPolicy]) -> dict[str, list[int]]:
+    """Runs of one experiment together, by its name; by its path if others share it."""
+    places: dict[Path, list[int]] = {}
+    for i, policy in enumerate(policies):
+        path = Path(policy.source)
+        place = path.parent if path.name.startswith(PREFIX) else path
+        places.setdefault(place, []).append(i)
+    names = Counter(place.name for place in places)
+    return {
+        place.name if names[place.name] == 1 else place.as_posix(): members
+        for place, members in places.items()
+    }
+
+
+def peers(policies: Sequence[NamedPolicy]) -> dict[str, list[int]]:
+    """Policies of one full speed together, by that.
+
+    A slower one earns less at home and keeps more of it wherever it is: in one ranking
+    that would pass for a relation of the two.
+    """
+    found: dict[str, list[int]] = {}
+    for i, policy in enumerate(policies):
+        found.setdefault(f"{policy.task.speeds.forward:.3g} m/s", []).append(i)
+    return found
