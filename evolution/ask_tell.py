@@ -107,11 +107,19 @@ def checked_state(
     return arrays
 
 
-class AskTell(ABC):
-    """An `Optimizer`, whose members are documented there, but for its algorithm.
+class Optimizer(ABC):
+    """A population-based maximiser that asks for fitness and is told.
 
     An algorithm says how the first population is drawn, what is asked after it, what is
     learnt from what is told, and which arrays all that depends on.
+
+    Attributes:
+        name: the algorithm's.
+        population: genomes `(population, genes)` after the last tell, read-only; before
+            the first tell the initial ones. As many as there are: it may grow.
+        fitness: their stored fitness `(population,)`, read-only; -inf before the first
+            tell.
+        generation: number of tells so far.
     """
 
     def __init__(self, name: str, population: np.ndarray, rng: Generator) -> None:
@@ -137,33 +145,61 @@ class AskTell(ABC):
         """
 
     def next_size(self) -> int:
-        """See `Optimizer.next_size`."""
+        """Number of genomes the next ask returns: what a generation costs."""
         return len(self.population)
 
     def ask(self) -> np.ndarray:
-        """See `Optimizer.ask`."""
+        """Genomes to evaluate `(next_size(), genes)`, the caller's to keep.
+
+        Raises:
+            AskTellError: the last genomes have not been told.
+        """
         self._refuse_pending("ask")
         self._asked = self._propose() if self.generation else self.population
         return self._asked.copy()
 
     def to_beat(self) -> np.ndarray:
-        """See `Optimizer.to_beat`: here, every fitness matters."""
+        """Fitness `(n,)` that each genome asked has to exceed to change anything.
+
+        A genome that cannot may be told any fitness that does not exceed it either;
+        -inf where every fitness matters, as it does if nothing else is said.
+
+        Raises:
+            AskTellError: nothing was asked.
+        """
         return np.full(len(self._pending()), -np.inf)
 
     def tell(self, fitness: ArrayLike) -> None:
-        """See `Optimizer.tell`."""
+        """Accept the fitness `(n,)` of the genomes asked; NaN counts as -inf.
+
+        Raises:
+            AskTellError: nothing was asked, or another shape was expected; what was
+                asked can still be told.
+        """
         asked = self._pending()
         self._learn(asked, checked_fitness(fitness, len(asked)))
         self.generation += 1
         self._asked = None
 
     def state(self) -> dict[str, np.ndarray]:
-        """See `Optimizer.state`."""
+        """Everything the next generations depend on, as plain arrays.
+
+        Raises:
+            AskTellError: asked genomes have not been told.
+        """
         self._refuse_pending("take the state")
         return self._arrays()
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
-        """See `Optimizer.restore`."""
+        """Go on where `state` was taken, with the very same random stream.
+
+        Genomes asked but not told are forgotten. The optimiser must have been made with
+        the parameters and the space of the one that was saved; of those, only what
+        shows in names and shapes is checked.
+
+        Raises:
+            ValueError: not a state of this optimiser, which then stays as it was.
+        """
         arrays = checked_state(state, like=self._arrays())
         rng = restored_generator(self._rng, arrays["generator"])
         self._load(arrays)

@@ -23,7 +23,7 @@ from cmaes import CMA
 from numpy.random import Generator
 
 from evolution.ask_tell import (
-    AskTell,
+    Optimizer,
     checked_state,
     generator_state,
     read_only,
@@ -82,8 +82,8 @@ class CmaEsParameters:
             raise ValueError(f"sigma: expected a number above 0, got {self.sigma}")
 
 
-class CmaEs(AskTell):
-    """An `Optimizer`, 'cma-es', whose attributes are documented there.
+class CmaEs(Optimizer):
+    """The optimiser 'cma-es'.
 
     Its population are the individuals last told, good or bad; it grows at a restart.
     """

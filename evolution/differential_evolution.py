@@ -18,7 +18,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.random import Generator
 
-from evolution.ask_tell import AskTell, read_only
+from evolution.ask_tell import Optimizer, read_only
 from evolution.bounds import BOUNDS_RULES, check_bounds_rule
 from evolution.search_space import SearchSpace
 
@@ -127,8 +127,8 @@ class DifferentialEvolutionParameters:
         check_bounds_rule(self.bounds_rule)
 
 
-class DifferentialEvolution(AskTell):
-    """An `Optimizer`, 'de-best' or 'de-rand', whose attributes are documented there.
+class DifferentialEvolution(Optimizer):
+    """The optimiser 'de-best' or 'de-rand', by its strategy.
 
     Its population are the survivors. Without `reevaluate_parents` their stored fitness
     is for ever the one that let them in.

@@ -21,7 +21,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.random import Generator
 
-from evolution.ask_tell import AskTell, read_only
+from evolution.ask_tell import Optimizer, read_only
 from evolution.bounds import BOUNDS_RULES, check_bounds_rule
 from evolution.search_space import SearchSpace, refuse_wide_steps
 
@@ -79,8 +79,8 @@ class EvolutionStrategyParameters:
         check_bounds_rule(self.bounds_rule)
 
 
-class EvolutionStrategy(AskTell):
-    """An `Optimizer`, 'one-plus-one-es', whose attributes are documented there.
+class EvolutionStrategy(Optimizer):
+    """The optimiser 'one-plus-one-es'.
 
     Its population are the parents. Their stored fitness is for ever the one that let
     them in.

@@ -18,7 +18,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.random import Generator
 
-from evolution.ask_tell import AskTell, read_only
+from evolution.ask_tell import Optimizer, read_only
 from evolution.search_space import SearchSpace
 
 # Levels of more bits are not worth a float64's 53 digits.
@@ -136,8 +136,8 @@ class GeneticAlgorithmParameters:
             )
 
 
-class GeneticAlgorithm(AskTell):
-    """An `Optimizer`, 'ga', whose attributes are documented there.
+class GeneticAlgorithm(Optimizer):
+    """The optimiser 'ga'.
 
     Its population are the individuals last told, good or bad.
     """

@@ -11,7 +11,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.random import Generator
 
-from evolution.ask_tell import AskTell, read_only
+from evolution.ask_tell import Optimizer, read_only
 from evolution.search_space import SearchSpace
 
 
@@ -49,8 +49,8 @@ class RandomSearchParameters:
             raise ValueError(f"population: expected at least 1, got {self.population}")
 
 
-class RandomSearch(AskTell):
-    """An `Optimizer`, 'random-search', whose attributes are documented there.
+class RandomSearch(Optimizer):
+    """The optimiser 'random-search'.
 
     Its population are the best individuals seen so far, the oldest first.
     """
