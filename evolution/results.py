@@ -71,7 +71,7 @@ def write_results(
         for robot, judge in judges.items()
         if met is not None
     }
-    # what the run believed its best to be, and what that is worth where it evolved
+    # what the run believed its best to be, and what that is worth on an ideal robot
     genome, stored = most_believed(experiment)
     believed = next(iter(judges.values())).test(config.network.decode(genome))
     most = {"stored": stored, "held_out": believed.mean}

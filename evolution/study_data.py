@@ -1,5 +1,6 @@
 """What a study has found so far, read back from its directory."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,6 +45,11 @@ class RunData:
     def held_out(self, robot: str) -> float:
         """The champion's mean on the test starts."""
         return self.champion.scores["held_out"][robot]["mean"]
+
+    def held_out_as_evolved(self, robot: str) -> float:
+        """The same with the disturbances it evolved with; nan if not tested so."""
+        tests = self.champion.scores.get("held_out_as_evolved", {})
+        return tests[robot]["mean"] if robot in tests else math.nan
 
 
 @dataclass(frozen=True, eq=False)

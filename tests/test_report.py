@@ -30,7 +30,7 @@ from evolution.report.blocks import (
     to_markdown,
 )
 from evolution.report.command import report, tables
-from evolution.report.findings import held_out_fitness
+from evolution.report.findings import WITH_NOISE, held_out_fitness, luck
 from evolution.report.pairs import compared, pair_rows
 from evolution.report.samples import TARGET_SHARES
 from evolution.report.successes import BEATS, FOLLOWS, success_rows
@@ -511,3 +511,33 @@ def test_bad_input_is_one_line(kind, tmp_path):
 def test_target_and_run_rows_follow_the_study_order(large):
     assert list(dict.fromkeys(row.experiment for row in target_rows(large))) == [*NAMES]
     assert list(dict.fromkeys(row["experiment"] for row in run_rows(large))) == [*NAMES]
+
+
+def test_luck_with_noise_is_held_against_starts_with_noise(tmp_path):
+    path = write_study(tmp_path / "study", {"de-best": [1, 2, 3], "ga": [1, 2, 3]})
+    data = load_study(path)
+    assert WITH_NOISE not in to_markdown(luck(data))
+    noisy = data.configs["ga"].model_copy(update={"noise": "calibrated"})
+    data = replace(data, configs={**data.configs, "ga": noisy})
+
+    def row():
+        text = to_markdown(luck(data))
+        assert WITH_NOISE in text
+        (found,) = (line for line in text.splitlines() if line.startswith("| GA |"))
+        return [cell.strip() for cell in found.strip("|").split("|")]
+
+    # tested on ideal robots only: stored fitness is another quantity
+    _, _, _, *cells = row()
+    assert cells == ["-"] * 5
+    text = to_markdown(luck(data))
+    assert re.search(r"\| DE/best/1/bin \| 3 \| \d[^|]*\| \d[^|]*\| -?\d", text)
+    experiment = summary(data, "out", False)["experiments"]["ga"]
+    assert experiment["held_out"]["epuck"]["share_of_stored"] is None
+    assert experiment["most_believed"] == {"stored": None, "held_out": None}
+    for run in data.runs["ga"]:
+        test = {"mean": run.stored - 7.0, "crash_rate": 0.0}
+        run.champion.scores["held_out_as_evolved"] = {"epuck_planar": test}
+    _, _, _, held_out, found, *believed = row()
+    assert held_out[0].isdigit()
+    assert found == "7.0 [7.0, 7.0]"
+    assert believed == ["-"] * 3

@@ -9,8 +9,10 @@ from evolution.report.samples import (
     class_means,
     clearance,
     clearances,
+    disturbed,
     kept,
     known,
+    like_for_like,
     most_believed,
     tests_of,
     whole_lap_share,
@@ -123,20 +125,28 @@ def rungs(data: StudyData) -> list[Block]:
     ]
 
 
+WITH_NOISE = (
+    "Experiments that evolved with noise are held against fresh starts with such "
+    "noise, where their champions were tested so."
+)
+
+
 def luck(data: StudyData) -> list[Block]:
     """What stored fitness promised and fresh starts did not keep."""
     robot = data.robots[0]
+    noisy = any(disturbed(data, name) for name in data.with_runs)
     rows = []
     for name, runs in data.with_runs.items():
-        stored, held_out = data.stored(name), data.held_out(name, robot)
+        stored, held_out = data.stored(name), like_for_like(data, name)
+        tested = np.isfinite(held_out)
         believed, worth = most_believed(data, name)
         rows.append(
             (
                 label(name),
                 str(len(runs)),
                 spread(stored),
-                spread(held_out),
-                spread(stored - held_out),
+                spread(held_out[tested]),
+                spread((stored - held_out)[tested]),
                 spread(believed),
                 spread(worth),
                 spread(believed - worth),
@@ -148,7 +158,7 @@ def luck(data: StudyData) -> list[Block]:
             f"On the {robot_name(robot)}, which it evolved on: stored against held-out "
             "fitness of the champion, then of the individual that the run believed "
             "most in. The difference is luck: of many noisy evaluations the highest is "
-            "believed."
+            "believed." + (f" {WITH_NOISE}" if noisy else "")
         ),
         Table(
             (

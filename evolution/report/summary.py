@@ -15,6 +15,7 @@ from evolution.report.pairs import pair_rows
 from evolution.report.samples import (
     class_means,
     clearances,
+    disturbed,
     kept,
     known,
     most_believed,
@@ -123,7 +124,10 @@ def _experiment(data: StudyData, name: str) -> dict[str, Any]:
                 "crash_rate": _described(
                     known(tests_of(data, name, robot), "crash_rate")
                 ),
-                "share_of_stored": _described(kept(data.held_out(name, robot), stored)),
+                # of experiments with noise, stored fitness is another quantity
+                "share_of_stored": None
+                if disturbed(data, name)
+                else _described(kept(data.held_out(name, robot), stored)),
                 "behaviour": class_means(data, name, robot),
                 "clearance": _described(clearances(data, name, robot)),
                 "champions_that_hug": int((clearances(data, name, robot) < HUG).sum()),

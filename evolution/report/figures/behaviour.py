@@ -27,6 +27,7 @@ from evolution.report.figures.style import (
     legend_below,
     robot_panels,
 )
+from evolution.report.samples import class_means
 from evolution.report.words import PAPERS, YARDSTICK_LABEL, label
 from evolution.study_data import RunData, StudyData
 
@@ -103,7 +104,7 @@ def trajectories(data: StudyData) -> tuple[Figure, str]:
     caption = (
         "Trajectories of champions on the wheeled robot from the first "
         f"{N_STARTS} test starts; of each experiment the median run by held-out "
-        f"fitness: {'; '.join(who)}. Circle: start; outline: where the robot ended; "
+        f"fitness there: {'; '.join(who)}. Circle: start; outline: where the robot ended; "
         "cross: crash."
     )
     return figure, caption
@@ -114,8 +115,9 @@ def _same_world(a: ExperimentConfig, b: ExperimentConfig) -> bool:
 
 
 def median_run(data: StudyData, name: str) -> RunData:
-    """The run of median held-out fitness on the last robot, the lower of two."""
-    order = np.argsort(data.held_out(name, data.robots[-1]), kind="stable")
+    """The run of median held-out fitness on the wheeled robot, the lower of two."""
+    robot = WHEELED_ROBOT if WHEELED_ROBOT in data.robots else data.robots[-1]
+    order = np.argsort(data.held_out(name, robot), kind="stable")
     return data.runs[name][order[(order.size - 1) // 2]]
 
 
@@ -157,14 +159,9 @@ def _class_shares(data: StudyData, robot: str) -> dict[str, dict[str, float]]:
     """
     found = {}
     for name, runs in data.with_runs.items():
-        tests = [run.champion.scores["held_out"][robot] for run in runs]
-        shares = [test["behaviour"] for test in tests if test.get("behaviour")]
+        shares = class_means(data, name, robot)
         if shares:
-            classes = dict.fromkeys(name for each in shares for name in each)
-            found[counted(name, len(shares))] = {
-                name: float(np.mean([each.get(name, 0.0) for each in shares]))
-                for name in classes
-            }
+            found[counted(name, len(runs))] = shares
     hand_written = data.yardstick.get(robot, {}).get("behaviour")
     if hand_written:
         found[HAND_WRITTEN] = dict(hand_written)

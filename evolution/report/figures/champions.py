@@ -21,6 +21,7 @@ from evolution.report.figures.style import (
     looks,
     robot_panels,
 )
+from evolution.report.samples import disturbed
 from evolution.report.words import YARDSTICK_LABEL, robot_name
 from evolution.statistics import quartiles
 from evolution.study_data import StudyData
@@ -67,6 +68,11 @@ def stored_and_held_out(data: StudyData) -> tuple[Figure, str]:
         "bar is what evolution believed of it; the vertical distance from there down "
         f"to a dot is the luck that it kept. {CHAMPION}"
     )
+    if any(disturbed(data, name) for name in runs):
+        caption += (
+            " Of experiments that evolved with noise the distance is more than luck: "
+            "the dots are of ideal robots."
+        )
     if reference is not None:
         caption += (
             f" Dashed: the {YARDSTICK_LABEL} on the {robot_name(data.robots[0])}."
