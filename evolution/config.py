@@ -28,6 +28,7 @@ from epuck_mj.motors import Speeds
 from epuck_mj.tasks import START_CLEARANCE
 from evolution.conditions import Conditions
 from evolution.optimizer import ALGORITHMS, OptimizerParameters, SearchSpace
+from evolution.setting import Setting
 
 
 def _of_known_algorithm(value: Any) -> Any:
@@ -172,6 +173,11 @@ class ExperimentConfig(BaseModel):
             sensor_range=self.sensor_range,
             speeds=Speeds(self.v_max, self.w_max),
         )
+
+    @property
+    def setting(self) -> Setting:
+        """In what the trials are lived."""
+        return Setting(self.arena, self.task, self.start_clearance)
 
     @property
     def network(self) -> Network:

@@ -20,6 +20,7 @@ from evolution.config import NoiseLevel
 from evolution.experiment import Purpose
 from evolution.held_out import HeldOut, judging, tested_on
 from evolution.named_policies import named_policies
+from evolution.setting import Setting
 
 MODULE = "evolution.evaluate"
 STARTS_MAX = 100_000
@@ -90,10 +91,10 @@ def evaluate(argv: Sequence[str]) -> int:
     for candidate in candidates:
         robots = [options.robot] if options.robot else tested_on(candidate.robot)
         arena = options.arena or candidate.arena
-        world = arena, candidate.task, candidate.start_clearance
+        setting = Setting(arena, candidate.task, candidate.start_clearance)
         for robot in robots:
             steps = candidate.task.steps
-            test = judge(robot, *world).test(
+            test = judge(robot, setting).test(
                 candidate.policy, options.starts, met(steps)
             )
             print(f"{candidate.name}, {Path(robot).name} in {Path(arena).name}")

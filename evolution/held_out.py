@@ -22,6 +22,7 @@ from epuck_mj.tracks import record_tracks
 from epuck_mj.wall_loops import wall_loops
 from evolution.champion import N_TEST, starts_for_test
 from evolution.evaluation import CAPACITY
+from evolution.setting import Setting
 from evolution.statistics import mean_interval, worst_share_mean
 
 WHEELED_ROBOT, PLANAR_ROBOT = "epuck", "epuck_planar"
@@ -76,22 +77,21 @@ class Everybody:
         return self
 
 
-def judging(threads: int = 0) -> Callable[..., "Judge"]:
-    """Gives the judge of a world, the same one for the same world: they take a second.
+def judging(threads: int = 0) -> Callable[[str, Setting], "Judge"]:
+    """Gives the judge of a robot in a setting, the same one again: they take a second.
 
     Args:
         threads: that step the robots; 0 is one per core.
 
     Returns:
-        A function of robot, arena, task and start clearance.
+        A function of robot and setting.
     """
 
     @cache
-    def judge(
-        robot: str, arena: str, task: TaskParameters, start_clearance: float
-    ) -> Judge:
-        scene = load_scene(robot, arena, task.control_step)
-        return Judge(scene, task, start_clearance, threads)
+    def judge(robot: str, setting: Setting) -> Judge:
+        task = setting.task
+        scene = load_scene(robot, setting.arena, task.control_step)
+        return Judge(scene, task, setting.start_clearance, threads)
 
     return judge
 

@@ -38,8 +38,10 @@ def judges(config: ExperimentConfig, threads: int = 0) -> dict[str, Judge]:
         UserError: if the wheeled robot cannot use the arena, or nobody can measure it.
     """
     judge = judging(threads)
-    world = config.arena, config.task, config.start_clearance
-    return {Path(robot).name: judge(robot, *world) for robot in tested_on(config.robot)}
+    return {
+        Path(robot).name: judge(robot, config.setting)
+        for robot in tested_on(config.robot)
+    }
 
 
 def write_results(

@@ -98,7 +98,7 @@ def study(argv: Sequence[str]) -> int:
             with interruption.raising():
                 # first: a study cut short has it, too
                 try:
-                    _measure_yardstick(directory, config)
+                    _measure_yardstick(directory)
                 except UserError as error:
                     print(f"{YARDSTICK} could not be tested: {error}", file=sys.stderr)
                 events = _shown(everything, jobs, _events(jobs, options))
@@ -119,15 +119,15 @@ def study(argv: Sequence[str]) -> int:
     return 1 if failed else 0
 
 
-def _measure_yardstick(directory: StudyDirectory, config: StudyConfig) -> None:
+def _measure_yardstick(directory: StudyDirectory) -> None:
     """Test the hand-written wall follower as champions are, unless it was before."""
     if directory.yardstick.exists():
         return
-    # in the world of the first experiment
-    world = next(iter(config.experiments.values()))
+    # in the setting of the first experiment
+    config = next(iter(directory.stored_config().experiments.values()))
     tests = {
         robot: asdict(judge.test(WallFollower()))
-        for robot, judge in judges(world).items()
+        for robot, judge in judges(config).items()
     }
     # whoever opens the study removes what looks left over
     with locked(directory.path, PATIENCE), files.writing():

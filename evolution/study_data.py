@@ -63,7 +63,7 @@ class StudyData:
         robots: that every champion was tested on; the one it evolved on comes first.
         steps: control steps of a trial: the most that a fitness can be.
         yardstick: scores of the hand-written wall follower by robot, as a champion's
-            `held_out`.
+            `held_out`; empty if not known, or not for all of these experiments.
         missing: what is not there and why, a line each.
     """
 
@@ -79,6 +79,10 @@ class StudyData:
     def with_runs(self) -> dict[str, tuple[RunData, ...]]:
         """The runs of the experiments that have any, in the study's order."""
         return {name: self.runs[name] for name in self.configs if self.runs.get(name)}
+
+    def alike(self, a: str, b: str) -> bool:
+        """Whether fitness of two experiments is worth the same."""
+        return self.configs[a].setting == self.configs[b].setting
 
     def yardstick_mean(self, robot: str) -> float | None:
         """Held-out fitness of the hand-written wall follower, None if not known."""
@@ -133,13 +137,22 @@ def load_study(path: Path) -> StudyData:
         )
     tested = robots.pop()
     yardstick: Mapping[str, Mapping] = {}
+    configs = config.experiments
+    first, *others = configs
+    differing = [n for n in others if configs[n].setting != configs[first].setting]
+    if differing:
+        missing.append(
+            f"comparisons with {first}: arena, task or start clearance of "
+            f"{', '.join(differing)} are others"
+        )
     try:
-        yardstick = _yardstick(directory, tested)
+        if not differing:
+            yardstick = _yardstick(directory, tested)
     except UserError as error:
         missing.append(f"{YARDSTICK}: {error}")
     return StudyData(
         path=path,
-        configs=config.experiments,
+        configs=configs,
         runs=runs,
         robots=tested,
         steps=steps.pop(),

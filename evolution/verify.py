@@ -23,6 +23,7 @@ from evolution.experiment import Purpose
 from evolution.held_out import Judge, judging
 from evolution.provenance import processor
 from evolution.run_directory import RunDirectory
+from evolution.setting import Setting
 from evolution.study_data import check_scores
 from evolution.study_directory import champions
 
@@ -76,7 +77,7 @@ def _runs(path: Path) -> list[RunDirectory]:
     return [RunDirectory(champion.parent) for champion in found]
 
 
-def _verified(run: RunDirectory, judge: Callable[..., Judge]) -> bool:
+def _verified(run: RunDirectory, judge: Callable[[str, Setting], Judge]) -> bool:
     """Whether all scores are the same; says so, or what differs."""
     config, champion = run.stored_config(), controller_file.load(run.champion)
     check_scores(champion.scores, run.champion)
@@ -97,10 +98,11 @@ def _verified(run: RunDirectory, judge: Callable[..., Judge]) -> bool:
 
 
 def _differing(
-    champion: ControllerFile, config: ExperimentConfig, judge: Callable[..., Judge]
+    champion: ControllerFile,
+    config: ExperimentConfig,
+    judge: Callable[[str, Setting], Judge],
 ) -> Iterator[str]:
     """What of the champion's held-out evaluations is not what is written."""
-    world = config.arena, config.task, config.start_clearance
     for kind in ("held_out", "held_out_as_evolved"):
         for robot, written in champion.scores.get(kind, {}).items():
             n, met, where = written["starts"], None, robot
@@ -111,7 +113,7 @@ def _differing(
                 where = f"{robot} as evolved on"
             # its own robot may be a file
             named = config.robot if Path(config.robot).name == robot else robot
-            test = judge(named, *world).test(champion.controller, n, met)
+            test = judge(named, config.setting).test(champion.controller, n, met)
             # as it is read back
             again = json.loads(json.dumps(asdict(test)))
             if again["mean"] != written["mean"]:
@@ -129,7 +131,7 @@ def _most_believed(
     run: RunDirectory,
     champion: ControllerFile,
     config: ExperimentConfig,
-    judge: Callable[..., Judge],
+    judge: Callable[[str, Setting], Judge],
 ) -> Iterator[str]:
     """Whether the individual with the highest stored fitness has another fitness."""
     written = champion.scores.get("most_believed")
@@ -141,18 +143,18 @@ def _most_believed(
         policy = config.network.decode(genome)
     except (KeyError, ValueError, IndexError) as error:
         raise UserError(f"'{run.best_individuals}' is damaged: {error}") from None
-    world = config.robot, config.arena, config.task, config.start_clearance
-    mean = judge(*world).test(policy).mean
+    mean = judge(config.robot, config.setting).test(policy).mean
     if mean != written["held_out"]:
         yield f"the most believed {written['held_out']!r} is now {mean!r}"
 
 
 def _edited(
-    champion: ControllerFile, config: ExperimentConfig, judge: Callable[..., Judge]
+    champion: ControllerFile,
+    config: ExperimentConfig,
+    judge: Callable[[str, Setting], Judge],
 ) -> Iterator[str]:
     """Whether robot or arena have been edited since."""
-    world = config.arena, config.task, config.start_clearance
-    now = dict(judge(config.robot, *world).scene.sha256)
+    now = dict(judge(config.robot, config.setting).scene.sha256)
     if champion.origin.mjcf_sha256 != now:
         yield "its robot or arena has been edited since"
 

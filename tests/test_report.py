@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from scipy import stats
 
 from epuck_mj.errors import UserError
@@ -541,3 +542,26 @@ def test_luck_with_noise_is_held_against_starts_with_noise(tmp_path):
     assert held_out[0].isdigit()
     assert found == "7.0 [7.0, 7.0]"
     assert believed == ["-"] * 3
+
+
+def test_experiments_of_other_settings_are_not_compared(tmp_path):
+    path = write_study(tmp_path / "study", seeds(12))
+    config = path / "study.yaml"
+    fields = yaml.safe_load(config.read_text())
+    fields["de-rand"]["v_max"] = 0.04
+    config.write_text(yaml.safe_dump(fields, sort_keys=False))
+    for place in path.glob("de-rand/*/config.yaml"):
+        own = yaml.safe_load(place.read_text()) | {"v_max": 0.04}
+        place.write_text(yaml.safe_dump(own, sort_keys=False))
+    data = load_study(path)
+    assert (
+        "comparisons with de-best: arena, task or start clearance of de-rand are others"
+    ) in data.missing
+    pairs = pair_rows(data)
+    assert {(row.a, row.b, row.family) for row in pairs} == {("de-best", "ga", 1)}
+    # the follower drives in the setting of one of them
+    assert not data.yardstick
+    successes = success_rows(data)
+    assert {row.criterion for row in successes} == {FOLLOWS}
+    others = {(row.experiment, row.other) for row in successes if row.other}
+    assert others == {("de-best", "ga")}

@@ -65,11 +65,13 @@ def claims(study: StudyData) -> list[Claim]:
     shares = _samples(study, lambda name: 100 * mean_to_best(study, name))
     early = _samples(study, lambda name: 100 * maturity(study, name))
     found = [
-        *_orders(_pairs(stored), stored, "in best (stored) fitness"),
+        *_orders(_pairs(study, stored), stored, "in best (stored) fitness"),
         *(_maximum(stored, name) for name in PAPER_BEST),
         *(_approaches(shares, name) for name in ("de-best", "de-rand")),
         _stays_apart(shares),
-        *_orders(_pairs(shares), shares, "in the mean's share of the best [%]")[1:],
+        *_orders(_pairs(study, shares), shares, "in the mean's share of the best [%]")[
+            1:
+        ],
         *(_mature_early(early, name) for name in ("de-best", "de-rand")),
         *(_follows(study, name) for name in PAPERS),
     ]
@@ -83,7 +85,7 @@ def held_out_order(study: StudyData, robot: str) -> list[Claim]:
     """
     held_out = _samples(study, lambda name: study.held_out(name, robot))
     measure = held_out_measure(robot)
-    rows = pairs_of(measure, measures(study)[measure])
+    rows = pairs_of(measure, measures(study)[measure], study.alike)
     found = _orders(rows, held_out, f"in held-out fitness on {robot}")
     return _of_the_paper(study, found)
 
@@ -149,10 +151,10 @@ def _of_the_paper(study: StudyData, found: Sequence[Claim]) -> list[Claim]:
     return [Claim(each.text, "-", each.n, OTHER_STUDY) for each in found]
 
 
-def _pairs(samples: dict[str, np.ndarray]) -> list[PairRow]:
+def _pairs(study: StudyData, samples: dict[str, np.ndarray]) -> list[PairRow]:
     """All pairs of the paper's algorithms that have runs."""
     filled = {name: sample for name, sample in samples.items() if sample.size}
-    return pairs_of("", filled)
+    return pairs_of("", filled, study.alike)
 
 
 def _orders(

@@ -100,7 +100,7 @@ def successes(data: StudyData) -> list[Block]:
         found = [row for row in rows if row.criterion == criterion]
         if not found:
             absent = (
-                "the hand-written wall follower was not tested"
+                "the hand-written wall follower was not tested in the setting of all"
                 if criterion == BEATS
                 else "not every run has behaviour classes"
             )

@@ -5,7 +5,7 @@ each such table is a question of its own.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -84,22 +84,25 @@ class PairRow:
 
 
 def pair_rows(data: StudyData) -> list[PairRow]:
-    """A row per measure and pair of experiments with runs, in the study's order."""
+    """A row per measure and pair of like experiments, in the study's order."""
     return [
         row
         for measure, samples in measures(data).items()
-        for row in pairs_of(measure, samples)
+        for row in pairs_of(measure, samples, data.alike)
     ]
 
 
-def pairs_of(measure: str, samples: Mapping[str, np.ndarray]) -> list[PairRow]:
+def pairs_of(
+    measure: str, samples: Mapping[str, np.ndarray], alike: Callable[[str, str], bool]
+) -> list[PairRow]:
     """The same within one measure.
 
     Args:
         measure: its name.
         samples: of each experiment, `(runs,)`, none of them empty.
+        alike: whether two experiments can be compared.
     """
-    pairs = list(combinations(samples, 2))
+    pairs = [pair for pair in combinations(samples, 2) if alike(*pair)]
     if not pairs:
         return []
     tests = [mann_whitney(samples[a], samples[b]) for a, b in pairs]

@@ -85,7 +85,7 @@ def success_rows(data: StudyData) -> list[SuccessRow]:
                 name: [met(run) for run in runs]
                 for name, runs in data.with_runs.items()
             }
-            rows += _successes(criterion, robot, outcomes)
+            rows += _successes(criterion, robot, outcomes, data.alike)
     # all of a criterion together
     return sorted(rows, key=lambda row: (BEATS, FOLLOWS).index(row.criterion))
 
@@ -106,7 +106,10 @@ def _test_of(run: RunData, robot: str) -> Any:
 
 
 def _successes(
-    criterion: str, robot: str, outcomes: Mapping[str, Sequence[bool]]
+    criterion: str,
+    robot: str,
+    outcomes: Mapping[str, Sequence[bool]],
+    alike: Callable[[str, str], bool],
 ) -> list[SuccessRow]:
     alone = {}
     for name, met in outcomes.items():
@@ -121,7 +124,7 @@ def _successes(
             low=share.low,
             high=share.high,
         )
-    pairs = list(combinations(alone.values(), 2))
+    pairs = [(alone[a], alone[b]) for a, b in combinations(alone, 2) if alike(a, b)]
     if not pairs:
         return list(alone.values())
     tests = [fisher(a.successes, a.n, b.successes, b.n) for a, b in pairs]

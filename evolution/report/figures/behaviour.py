@@ -104,8 +104,8 @@ def trajectories(data: StudyData) -> tuple[Figure, str]:
     caption = (
         "Trajectories of champions on the wheeled robot from the first "
         f"{N_STARTS} test starts; of each experiment the median run by held-out "
-        f"fitness there: {'; '.join(who)}. Circle: start; outline: where the robot ended; "
-        "cross: crash."
+        f"fitness there: {'; '.join(who)}. Circle: start; outline: where the robot "
+        "ended; cross: crash."
     )
     return figure, caption
 

@@ -1,0 +1,20 @@
+"""Setting: in what trials are lived, by whatever robot."""
+
+from dataclasses import dataclass
+
+from epuck_mj.control import TaskParameters
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Fitness is worth the same where these are the same.
+
+    Attributes:
+        arena: name of a shipped arena, or path of its MJCF.
+        task: what a trial is.
+        start_clearance: least distance from the shell to a wall at a start [m].
+    """
+
+    arena: str
+    task: TaskParameters
+    start_clearance: float
