@@ -25,7 +25,7 @@ class Origin:
         arena: name of a shipped arena, or path of its MJCF.
         start_clearance: least distance from the shell to a wall at a start [m]; None
             if the file does not say.
-        mjcf_sha256: of each text compiled: `arena`, `robot`, and includes by name.
+        mjcf_sha256: of each file compiled: `arena`, `robot`, and all others by name.
     """
 
     robot: str

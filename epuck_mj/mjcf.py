@@ -1,7 +1,11 @@
 """The MJCF of a scene as text: where it is, and an arena with its robot exchanged."""
 
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+
+import mujoco
 
 from epuck_mj.errors import UserError
 from epuck_mj.files import find, is_file, read_text
@@ -48,34 +52,84 @@ def _find(name: str, kind: str, shipped: list[Path]) -> Path:
     return find(name, kind, by_name, "an MJCF").resolve()
 
 
-def with_robot(arena: Path, robot: Path) -> tuple[str, dict[str, bytes]]:
+@dataclass(frozen=True)
+class SceneText:
+    """An arena with its robot exchanged, not yet compiled.
+
+    Attributes:
+        text: of the arena.
+        files: what it includes, by the name it includes it by.
+        paths: where each of these is from.
+        arena: where the text is from.
+        robot: where the robot is from, which one of the files is.
+    """
+
+    text: str
+    files: Mapping[str, bytes]
+    paths: Mapping[str, Path]
+    arena: Path
+    robot: Path
+
+
+def with_robot(arena: Path, robot: Path) -> SceneText:
     """The arena's text and the files it includes, the robot among them replaced.
 
     Raises:
         UserError: if a file is missing or no XML, includes what MuJoCo would not find,
             or the arena is a robot itself.
     """
-    text = read_text(arena)
-    files, found = {}, False
-    _refuse_includes(robot)
+    text, robot_text = read_text(arena), _included(robot)
+    paths = {}
     for name in _includes(text, arena):
         path = arena.parent / name
         # a copied arena may name a robot that it left behind
         if path.name in SHIPPED_ROBOTS or _has_robot(read_text(path), path):
-            found, path = True, robot
-        _refuse_includes(path)
-        files[name] = read_text(path).encode()
-    if found:
-        return text, files
-    if _has_robot(text, arena):
-        raise UserError(
-            f"arena '{arena}' defines its own body '{ROBOT_BODY}': expected walls "
-            "only, or a robot by <include>"
-        )
-    # walls only: the robot goes last, so line numbers stay
-    files[ADDED_ROBOT] = read_text(robot).encode()
-    head, _, tail = text.rpartition("</mujoco>")
-    return f'{head}<include file="{ADDED_ROBOT}"/></mujoco>{tail}', files
+            path = robot
+        paths[name] = path
+    if robot not in paths.values():
+        if _has_robot(text, arena):
+            raise UserError(
+                f"arena '{arena}' defines its own body '{ROBOT_BODY}': expected walls "
+                "only, or a robot by <include>"
+            )
+        # walls only: the robot goes last, so line numbers stay
+        paths[ADDED_ROBOT] = robot
+        head, _, tail = text.rpartition("</mujoco>")
+        text = f'{head}<include file="{ADDED_ROBOT}"/></mujoco>{tail}'
+    files = {
+        name: (robot_text if path == robot else _included(path)).encode()
+        for name, path in paths.items()
+    }
+    return SceneText(text, files, paths, arena, robot)
+
+
+def find_assets(spec: mujoco.MjSpec, scene: SceneText) -> dict[str, Path]:
+    """The files of meshes, textures and height fields by name, as far as they exist.
+
+    They are looked for beside the arena, then beside the robot; the spec is told where.
+    """
+    found = {}
+    spec.modelfiledir = str(scene.arena.parent)
+    # MuJoCo puts it before the names of files that the robot names
+    include = next(name for name, path in scene.paths.items() if path == scene.robot)
+    prefix = Path(include).parent
+    for parts, folder in (
+        (spec.meshes, spec.meshdir),
+        (spec.textures, spec.texturedir),
+        (spec.hfields, spec.meshdir),
+    ):
+        for part in parts:
+            name = Path(part.file)
+            own = name.relative_to(prefix) if name.is_relative_to(prefix) else name
+            places = (
+                scene.arena.parent / folder / name,
+                scene.robot.parent / folder / own,
+            )
+            path = next((path for path in places if part.file and is_file(path)), None)
+            if path is not None:
+                found[own.as_posix()] = path
+                part.file = str(path)
+    return found
 
 
 def _parse(text: str, path: Path) -> ET.Element:
@@ -89,14 +143,16 @@ def _includes(text: str, path: Path) -> list[str]:
     return [e.get("file", "") for e in _parse(text, path).iter("include")]
 
 
-def _refuse_includes(path: Path) -> None:
-    """Refuse a file to be included that includes others: nobody would hash those."""
-    inner = _includes(read_text(path), path)
+def _included(path: Path) -> str:
+    """The text of a file that is included; it includes none: nobody would hash it."""
+    text = read_text(path)
+    inner = _includes(text, path)
     if inner:
         raise UserError(
             f"'{path}' includes '{inner[0]}': an included file cannot include others, "
             "nor can a robot; expected it in the arena"
         )
+    return text
 
 
 def _has_robot(text: str, path: Path) -> bool:

@@ -6,7 +6,8 @@ differ in their base and nothing else: everybody else calls `Scene.qpos` and fri
 """
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +16,6 @@ import mujoco
 import numpy as np
 
 from epuck_mj.errors import UserError
-from epuck_mj.files import read_text
 from epuck_mj.interface import (
     PROXIMITY,
     ROBOT_BODY,
@@ -27,7 +27,7 @@ from epuck_mj.interface import (
     index_of,
     sensor_address,
 )
-from epuck_mj.mjcf import find_arena, find_robot, with_robot
+from epuck_mj.mjcf import find_arena, find_assets, find_robot, with_robot
 from epuck_mj.sensors import Reading
 
 
@@ -41,7 +41,7 @@ class Scene:
         wheels: indices of the wheels' actuators, left and right, `(2,)`.
         robot: path of the robot's MJCF.
         arena: path of the arena's MJCF.
-        sha256: of each text compiled: `arena`, `robot`, and every include by name.
+        sha256: of each file compiled: `arena`, `robot`, and all others by name.
     """
 
     model: mujoco.MjModel
@@ -105,31 +105,33 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
     """
     robot_path, arena_path = find_robot(robot), find_arena(arena)
     # compiled alone first: errors in an included file have no line number
-    _compile(mujoco.MjSpec.from_file, str(robot_path), source=robot_path)
-    text, files = with_robot(arena_path, robot_path)
-    robot_text = read_text(robot_path).encode()
-    texts = {"arena": text.encode(), "robot": robot_text}
-    texts |= {name: file for name, file in files.items() if file != robot_text}
-    model = _compile(
-        lambda: mujoco.MjSpec.from_string(text, include=files), source=arena_path
-    )
-    sha256 = {
-        name: hashlib.sha256(content).hexdigest() for name, content in texts.items()
-    }
-    return _index(model, robot_path, arena_path, sha256, control_step)
-
-
-def _compile(make_spec, *args, source: Path) -> mujoco.MjModel:
-    """Compile, with MuJoCo's complaint about `source` on one line."""
-    try:
-        spec = make_spec(*args)
-        # meshes and textures are looked for beside the file
-        spec.modelfiledir = str(source.parent)
+    with _complaints(robot_path):
+        mujoco.MjSpec.from_file(str(robot_path)).compile()
+    scene = with_robot(arena_path, robot_path)
+    with _complaints(arena_path):
+        spec = mujoco.MjSpec.from_string(scene.text, include=dict(scene.files))
+        assets = find_assets(spec, scene)
         # a robot that brings its converged step wants no other from the arena
         step = spec.numeric(TIMESTEP)
         if step is not None:
             spec.option.timestep = step.data[0]
-        return spec.compile()
+        model = spec.compile()
+    contents = {"arena": scene.text.encode()}
+    for name, content in scene.files.items():
+        own = scene.paths[name] == robot_path
+        contents["robot" if own else name] = content
+    contents |= {name: path.read_bytes() for name, path in assets.items()}
+    sha256 = {
+        name: hashlib.sha256(content).hexdigest() for name, content in contents.items()
+    }
+    return _index(model, robot_path, arena_path, sha256, control_step)
+
+
+@contextmanager
+def _complaints(source: Path) -> Iterator[None]:
+    """MuJoCo's complaints about a file on one line."""
+    try:
+        yield
     except ValueError as error:
         message = " ".join(str(error).split())
         raise UserError(f"MuJoCo cannot compile '{source}': {message}") from None

@@ -13,8 +13,10 @@ from matplotlib.image import imread
 from epuck_mj.check import check_arena, report
 from epuck_mj.check.__main__ import run
 from epuck_mj.check.findings import Severity
+from epuck_mj.check.source import read
 from epuck_mj.check.walls import seen_by_rays
 from epuck_mj.errors import UserError
+from epuck_mj.interface import ROBOT_BODY
 from epuck_mj.mjcf import MODELS
 
 ROBOTS = ("epuck", "epuck_planar")
@@ -492,3 +494,15 @@ def test_no_damage_ends_in_a_traceback(check, seed):
         assert "\n" not in str(problem)
         return
     assert status == int(" error: " in "\n".join(lines))
+
+
+def test_a_robot_s_elements_are_placed_in_its_file_whatever_ends_its_lines(tmp_path):
+    robot = tmp_path / "mine.xml"
+    text = (MODELS / "epuck_planar.xml").read_text()
+    robot.write_bytes(text.replace("\n", "\r\n").encode())
+    arena = tmp_path / "my.xml"
+    include = '<include file="epuck.xml"/></mujoco>'
+    arena.write_text(ARENA.replace("</mujoco>", include))
+    source = read(arena, robot)
+    (body,) = (e for e in source.elements if e.attributes.get("name") == ROBOT_BODY)
+    assert body.place.file == robot

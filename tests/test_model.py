@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 from epuck_mj import constants as c
+from epuck_mj.check import check_arena
+from epuck_mj.check.findings import Severity
 from epuck_mj.errors import UserError
 from epuck_mj.interface import PROXIMITY
 from epuck_mj.mjcf import MODELS
@@ -187,6 +189,49 @@ def test_an_arena_with_another_include_and_its_own_robot_file(tmp_path):
     scene = load_scene("epuck_planar", str(path))
     assert scene.model.geom("pillar").id > 0
     assert scene.model.nq == 3
+
+
+TETRAHEDRON = "v 0 0 0\nv .02 0 0\nv 0 .02 0\nv 0 0 .02\n"
+TETRAHEDRON += "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+def with_mesh(text: str) -> str:
+    """An MJCF with a mesh for show, in a folder of meshes."""
+    asset = '<asset><mesh name="hat" file="hat.obj"/></asset></mujoco>'
+    geom = '<geom type="mesh" mesh="hat" contype="0" conaffinity="0" pos="0 0 .06"'
+    return (
+        text.replace(">", '><compiler meshdir="meshes"/>', 1)
+        .replace("</mujoco>", asset)
+        .replace('<geom name="shell"', f'{geom} mass="0"/><geom name="shell"', 1)
+    )
+
+
+def test_meshes_are_looked_for_beside_the_arena_and_beside_the_robot(
+    tmp_path, monkeypatch
+):
+    elsewhere, robots = tmp_path / "elsewhere", tmp_path / "robots"
+    for folder in (elsewhere, robots / "meshes"):
+        folder.mkdir(parents=True)
+    monkeypatch.chdir(elsewhere)
+    mesh = robots / "meshes" / "hat.obj"
+    mesh.write_text(TETRAHEDRON)
+    robot = robots / "mine.xml"
+    robot.write_text(with_mesh((MODELS / "epuck_planar.xml").read_text()))
+    scene = load_scene(str(robot), "pillars")
+    assert scene.model.mesh("hat").id == 0
+    assert list(scene.sha256) == ["arena", "robot", "../stage.xml", "hat.obj"]
+    findings = check_arena("pillars", [str(robot)]).findings
+    assert Severity.ERROR not in {found.severity for found in findings}
+    # a hash of every file that counts
+    before = scene.sha256["hat.obj"]
+    mesh.write_text(TETRAHEDRON.replace(".02", ".03"))
+    assert load_scene(str(robot), "pillars").sha256["hat.obj"] != before
+    mesh.unlink()
+    assert "hat.obj" in refusal(robot=robot, arena="pillars")
+    # not from wherever somebody happens to be
+    (elsewhere / "meshes").mkdir()
+    (elsewhere / "meshes" / "hat.obj").write_text(TETRAHEDRON)
+    assert "hat.obj" in refusal(robot=robot, arena="pillars")
 
 
 def test_an_included_file_includes_no_others(tmp_path):

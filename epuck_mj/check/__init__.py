@@ -100,9 +100,9 @@ def _scene(source: Source, robot: str) -> Scene:
     """
     step = source.setting("option", "timestep")
     try:
-        scene = load_scene(robot, str(source.arena))
+        scene = load_scene(robot, str(source.scene.arena))
     except UserError as problem:
-        place = step if "physics step" in str(problem) else Place(source.arena)
+        place = step if "physics step" in str(problem) else Place(source.scene.arena)
         raise Unusable(error(TOPIC, str(problem), place)) from None
     if scene.n_substeps > SUBSTEPS_MAX:
         text = f"a control step would be {scene.n_substeps:,} physics steps long; "

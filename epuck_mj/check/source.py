@@ -17,7 +17,7 @@ from epuck_mj.check.findings import Place, Unusable, error
 from epuck_mj.errors import UserError
 from epuck_mj.files import is_file, read_text
 from epuck_mj.interface import ROBOT_BODY
-from epuck_mj.mjcf import ADDED_ROBOT, SHIPPED_ROBOTS, with_robot
+from epuck_mj.mjcf import SHIPPED_ROBOTS, SceneText, find_assets, with_robot
 
 TOPIC = "file"
 
@@ -37,7 +37,7 @@ class Source:
 
     text: str
     elements: tuple[Element, ...]
-    arena: Path
+    scene: SceneText
 
     def setting(self, tag: str, attribute: str) -> Place:
         """Where the last element of a kind sets an attribute, or the arena's file."""
@@ -46,7 +46,7 @@ class Source:
             for element in self.elements
             if element.tag == tag and attribute in element.attributes
         ]
-        return places[-1] if places else Place(self.arena)
+        return places[-1] if places else Place(self.scene.arena)
 
 
 def read(arena: Path, robot: Path) -> Source:
@@ -57,7 +57,7 @@ def read(arena: Path, robot: Path) -> Source:
         UserError: if the arena cannot be read at all.
     """
     alone = _Text()
-    alone.add(_bytes(arena), arena)
+    alone.add(read_text(arena).encode(), arena)
     names = set()
     for element in alone.elements:
         if element.tag == "include":
@@ -72,21 +72,17 @@ def read(arena: Path, robot: Path) -> Source:
                 _refuse_nested(arena.parent / name)
     own = [e for e in alone.elements if e.attributes.get("name") == ROBOT_BODY]
     try:
-        text, files = with_robot(arena, robot)
+        scene = with_robot(arena, robot)
     except UserError as problem:
         place = next((e.place for e in own if e.tag == "body"), Place(arena))
         raise Unusable(error(TOPIC, str(problem), place)) from None
-    whole = _Text({name: arena.parent / name for name in files}, files)
-    robot_text = robot.read_bytes()
-    for name, content in files.items():
-        if name == ADDED_ROBOT or content == robot_text:
-            whole.paths[name] = robot
+    whole = _Text(scene.paths, scene.files)
     try:
-        whole.add(text.encode(), arena)
+        whole.add(scene.text.encode(), arena)
     except Unusable:
         end = "expected the file to end with </mujoco>, where the robot is put"
         raise Unusable(error(TOPIC, end, Place(arena))) from None
-    return Source("\n".join(whole.lines), tuple(whole.elements), arena)
+    return Source("\n".join(whole.lines), tuple(whole.elements), scene)
 
 
 def compiled(source: Source) -> tuple[mujoco.MjModel, tuple[Place, ...]]:
@@ -97,8 +93,7 @@ def compiled(source: Source) -> tuple[mujoco.MjModel, tuple[Place, ...]]:
     """
     try:
         spec = mujoco.MjSpec.from_string(source.text)
-        # meshes and textures are looked for beside the file
-        spec.modelfiledir = str(source.arena.parent)
+        find_assets(spec, source.scene)
         model = spec.compile()
     except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as problem:
         message = " ".join(str(problem).split())
@@ -121,14 +116,14 @@ def _place(source: Source, said: str) -> Place:
     for element in source.elements:
         if f"'{element.attributes.get('file')}'" in said:
             return element.place
-    return Place(source.arena)
+    return Place(source.scene.arena)
 
 
 @dataclass
 class _Text:
     """Collects elements, those of included files in the place of the include."""
 
-    paths: dict[str, Path] = field(default_factory=dict)
+    paths: Mapping[str, Path] = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)
     lines: list[str] = field(default_factory=list)
     elements: list[Element] = field(default_factory=list)
@@ -172,10 +167,6 @@ def _shown(tag: str, attributes: Mapping[str, str]) -> str:
     return f"<{tag}>"
 
 
-def _bytes(path: Path) -> bytes:
-    return read_text(path).encode()
-
-
 def _included(element: Element, arena: Path) -> str:
     """Name of the file that an include names, if it is there."""
     name = element.attributes.get("file", "")
@@ -188,7 +179,7 @@ def _included(element: Element, arena: Path) -> str:
 
 def _refuse_nested(path: Path) -> None:
     inner = _Text()
-    inner.add(_bytes(path), path)
+    inner.add(read_text(path).encode(), path)
     for element in inner.elements:
         if element.tag == "include":
             text = "an included file cannot include others; expected it in the arena"
