@@ -1,6 +1,6 @@
 """The control step and the trial: the same for one robot and for thousands."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import astuple, dataclass, field
 from typing import Any, Protocol, Self
 
@@ -120,6 +120,26 @@ def control_step(
     # a crash stops the calculation: its own step earns nothing
     fitness = np.where(reading.contact, 0.0, task.step_fitness(action, judged))
     return ControlStep(action, wheels, reading, seen, fitness)
+
+
+def drive(
+    robot: Robot, policy: Policy, first: Reading, task: TaskParameters
+) -> Iterator[ControlStep]:
+    """The control steps of one robot's trial, ended by a crash or after `task.steps`.
+
+    Args:
+        robot: that has been put on its start.
+        policy: called with what is observed, `(1, 8)`.
+        first: what was sensed there, before anything moved.
+        task: what a trial is.
+    """
+    observation = observe(first.distance, task.sensor_range)
+    for _ in range(task.steps):
+        step = control_step(robot, policy, observation, task)
+        observation = step.observation
+        yield step
+        if step.reading.contact.any():
+            return
 
 
 @dataclass(frozen=True)

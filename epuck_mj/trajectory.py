@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 
 from epuck_mj.constants import N_PROXIMITY
-from epuck_mj.control import Policy, TaskParameters, control_step
+from epuck_mj.control import Policy, TaskParameters, drive
 from epuck_mj.controller import Controller
 from epuck_mj.errors import UserError
 from epuck_mj.files import read_arrays, write_arrays, writing
@@ -135,21 +135,14 @@ def record(
         task: what a trial is.
     """
     robots = SimulatedRobots(scene, 1, 1)
-    reading = robots.reset(np.asarray(start, float)[None])
-    observation = observe(reading.distance, task.sensor_range)
-    poses, readings, observations = [robots.poses()], [reading], [observation]
-    steps = []
-    for _ in range(task.steps):
-        step = control_step(robots, policy, observation, task)
-        observation = step.observation
-        steps.append(step)
+    first = robots.reset(np.asarray(start, float)[None])
+    poses, steps = [robots.poses()], []
+    for step in drive(robots, policy, first, task):
         poses.append(robots.poses())
-        readings.append(step.reading)
-        observations.append(observation)
-        if step.reading.contact[0]:
-            break
+        steps.append(step)
+    readings = [first, *(step.reading for step in steps)]
     distance = np.concatenate([reading.distance for reading in readings])
-    seen = np.concatenate(observations)
+    seen = observe(distance, task.sensor_range)
     return Trajectory(
         time=np.arange(len(poses)) * task.control_step,
         pose=np.concatenate(poses),

@@ -22,11 +22,11 @@ import numpy as np
 import tyro
 
 from epuck_mj.command_line import main, parse
-from epuck_mj.control import ControlStep, Policy, TaskParameters, control_step
+from epuck_mj.control import Policy, TaskParameters, drive
 from epuck_mj.controller_file import load
 from epuck_mj.errors import UserError
 from epuck_mj.model import Scene, load_scene
-from epuck_mj.sensors import Reading, observe
+from epuck_mj.sensors import Reading
 from epuck_mj.starts import FreeSpace
 from epuck_mj.tasks import START_CLEARANCE
 from epuck_mj.wall_follower import WallFollower
@@ -60,18 +60,18 @@ class WatchedRobot:
     """One robot in an `MjData` that others can look at after every physics step.
 
     It starts and moves as `epuck_mj.simulation.SimulatedRobots` does.
+
+    Attributes:
+        scene: robot and arena.
+        data: what others can look at.
+        moved: called when the robot was reset and after every physics step.
     """
 
-    def __init__(self, scene: Scene, moved: Callable[[], None] = lambda: None):
-        """Allocate the robot.
-
-        Args:
-            scene: robot and arena.
-            moved: called when the robot was reset and after every physics step.
-        """
+    def __init__(self, scene: Scene):
+        """Allocate the robot."""
         self.scene = scene
         self.data = mujoco.MjData(scene.model)
-        self.moved = moved
+        self.moved: Callable[[], None] = lambda: None
 
     def reset(self, start: np.ndarray) -> Reading:
         """Put the robot at rest on a start `(3,)`: x, y [m], yaw [rad]."""
@@ -99,20 +99,6 @@ class WatchedRobot:
 
     def _reading(self) -> Reading:
         return self.scene.reading(self.data.sensordata[None].copy())
-
-
-def drive(
-    robot: WatchedRobot, policy: Policy, start: np.ndarray, task: TaskParameters
-) -> Iterator[ControlStep]:
-    """The control steps of one trial, ended by a crash or after `task.steps`."""
-    reading = robot.reset(start)
-    observation = observe(reading.distance, task.sensor_range)
-    for _ in range(task.steps):
-        step = control_step(robot, policy, observation, task)
-        observation = step.observation
-        yield step
-        if step.reading.contact[0]:
-            return
 
 
 class Clock:
@@ -158,7 +144,7 @@ def watch(
     robot.moved = show
     for number, start in enumerate(starts, 1):
         fitness, crashed, n_steps = 0.0, False, 0
-        for done in drive(robot, policy, start, task):
+        for done in drive(robot, policy, robot.reset(start), task):
             fitness += float(done.fitness[0])
             crashed, n_steps = bool(done.reading.contact[0]), n_steps + 1
             if not window.is_running():

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from epuck_mj import view
-from epuck_mj.control import TaskParameters
+from epuck_mj.control import TaskParameters, drive
 from epuck_mj.controller import Network
 from epuck_mj.controller_file import ControllerFile, Origin
 from epuck_mj.errors import UserError
@@ -48,7 +48,7 @@ def test_a_trial_is_the_one_that_record_gives(robot, policy):
     # one robot for all trials: a reset leaves nothing of the one before
     for start in FreeSpace(scene, 0.01).sample(np.random.default_rng(0), 4):
         recorded = record(scene, policy, start, TASK)
-        steps = list(view.drive(watched, policy, start, TASK))
+        steps = list(drive(watched, policy, watched.reset(start), TASK))
         for name in ("action", "command", "fitness"):
             done = np.concatenate([getattr(step, name) for step in steps])
             np.testing.assert_array_equal(done, getattr(recorded, name))

@@ -7,10 +7,9 @@ import mujoco
 import numpy as np
 
 from epuck_mj.check.findings import Finding, Place, info, warning
-from epuck_mj.control import TaskParameters, control_step
+from epuck_mj.control import ControlStep, TaskParameters, drive
 from epuck_mj.interface import TIMESTEP
 from epuck_mj.model import Scene
-from epuck_mj.sensors import observe
 from epuck_mj.simulation import SimulatedRobots
 from epuck_mj.wall_follower import WallFollower
 
@@ -76,18 +75,16 @@ def _standing(scene: Scene, start: np.ndarray) -> Iterator[None]:
         yield
 
 
-def _driving(scene: Scene, start: np.ndarray, task: TaskParameters) -> Iterator[None]:
+def _driving(
+    scene: Scene, start: np.ndarray, task: TaskParameters
+) -> Iterator[ControlStep]:
     """Control steps of a robot with a controller, for ever."""
     robots, policy = SimulatedRobots(scene, 1, 1), WallFollower()
     while True:
-        reading = robots.reset(start[None])
-        while not reading.contact[0]:
-            observation = observe(reading.distance, task.sensor_range)
-            reading = control_step(robots, policy, observation, task).reading
-            yield
+        yield from drive(robots, policy, robots.reset(start[None]), task)
 
 
-def _rates(steps: Iterator[None]) -> tuple[float, float]:
+def _rates(steps: Iterator[object]) -> tuple[float, float]:
     """How many steps are done per second, and per second of CPU time."""
     start, cpu, n = time.perf_counter(), time.process_time(), 0
     while (elapsed := time.perf_counter() - start) < MEASURED:
