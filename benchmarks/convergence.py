@@ -22,8 +22,7 @@ from epuck_mj.control import BatchPolicy, TaskParameters, run_trials
 from epuck_mj.controller_file import load
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.simulation import SimulatedRobots
-from epuck_mj.starts import FreeSpace
-from epuck_mj.tasks import START_CLEARANCE
+from epuck_mj.starts import START_CLEARANCE, FreeSpace
 from epuck_mj.wall_follower import WallFollower
 
 HERE = Path(__file__).resolve().parent

@@ -23,6 +23,9 @@ NODES_MAX = 400
 SPACING_MIN = 0.01
 """Grid spacing [m], unless the arena is larger than NODES_MAX of it."""
 
+START_CLEARANCE = 0.01
+"""Least distance to a wall at a start, if nobody says otherwise [m]. Chosen."""
+
 BLOCK = 64
 """Candidates drawn at once; part of what a seed means."""
 
@@ -56,6 +59,14 @@ class Grid:
         return self.origin + self.spacing * np.moveaxis(
             np.indices(self.free.shape), 0, -1
         )
+
+    def near_inside(self, points: np.ndarray) -> np.ndarray:
+        """Whether one of the four nodes around points `(n, 2)` is inside, `(n,)`."""
+        low = np.floor((points - self.origin) / self.spacing).astype(int)
+        near = np.zeros(len(points), bool)
+        for corner in np.ndindex(2, 2):
+            near |= self.inside[tuple((low + corner).T)]
+        return near
 
 
 def survey(scene: Scene, clearance: float) -> Grid:
@@ -118,9 +129,7 @@ class FreeSpace:
                 f"arena '{scene.arena}' has no room for a start: its walls "
                 "leave no enclosed space where the robot keeps its start clearance"
             )
-        self.lower, self.upper = grid.lower, grid.upper
-        self.origin, self.spacing = grid.origin, grid.spacing
-        self.inside = grid.inside
+        self.grid = grid
 
     def sample(self, rng: np.random.Generator, n: int) -> np.ndarray:
         """Uniform random starts `(n, 3)`: x, y [m], yaw [rad].
@@ -128,13 +137,13 @@ class FreeSpace:
         Raises:
             UserError: if the free space is too small to be hit.
         """
-        starts = np.zeros((0, 3))
+        starts, grid = np.zeros((0, 3)), self.grid
         for _ in range(BLOCKS_MAX):
             draws = rng.random((BLOCK, 3))
             poses = np.empty_like(draws)
-            poses[:, :2] = self.lower + draws[:, :2] * (self.upper - self.lower)
+            poses[:, :2] = grid.lower + draws[:, :2] * (grid.upper - grid.lower)
             poses[:, 2] = np.pi * (2 * draws[:, 2] - 1)
-            poses = poses[self._near_inside(poses[:, :2])]
+            poses = poses[grid.near_inside(poses[:, :2])]
             poses = poses[_free(self._checks, self._scene, poses)]
             starts = np.concatenate([starts, poses])[:n]
             if len(starts) == n:
@@ -143,14 +152,6 @@ class FreeSpace:
             f"arena '{self._scene.arena}' has almost no room for a start: "
             f"{len(starts)} of {n} found among {BLOCK * BLOCKS_MAX} candidates"
         )
-
-    def _near_inside(self, points: np.ndarray) -> np.ndarray:
-        """Whether one of the four nodes around each point `(n, 2)` is inside."""
-        low = np.floor((points - self.origin) / self.spacing).astype(int)
-        near = np.zeros(len(points), bool)
-        for corner in np.ndindex(2, 2):
-            near |= self.inside[tuple((low + corner).T)]
-        return near
 
 
 def _with_margin(model: mujoco.MjModel, clearance: float) -> mujoco.MjModel:

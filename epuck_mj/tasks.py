@@ -26,10 +26,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.motors import command
 from epuck_mj.sensors import Reading, observe
-from epuck_mj.starts import FreeSpace
-
-START_CLEARANCE = 0.01
-"""Least distance from the shell to a wall at a start [m]."""
+from epuck_mj.starts import START_CLEARANCE, FreeSpace
 
 SUITE = containers.TaggedTasks()
 

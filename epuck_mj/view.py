@@ -27,8 +27,7 @@ from epuck_mj.controller_file import load
 from epuck_mj.errors import UserError
 from epuck_mj.model import Scene, load_scene
 from epuck_mj.sensors import Reading
-from epuck_mj.starts import FreeSpace
-from epuck_mj.tasks import START_CLEARANCE
+from epuck_mj.starts import START_CLEARANCE, FreeSpace
 from epuck_mj.wall_follower import WallFollower
 
 LATE_MAX = 0.2

@@ -127,14 +127,12 @@ def wall_loops(scene: Scene, probe: ClearanceProbe) -> WallLoops:
     Raises:
         UserError: if no walls, no room or no inside is there.
     """
-    space = FreeSpace(scene, LOOP_CLEARANCE)
-    # clearance on the nodes of its grid
-    nodes = np.moveaxis(np.indices(space.inside.shape), 0, -1)
-    poses = np.zeros((*space.inside.shape, 3))
-    poses[..., :2] = space.origin + space.spacing * nodes
+    grid = FreeSpace(scene, LOOP_CLEARANCE).grid
+    poses = np.zeros((*grid.inside.shape, 3))
+    poses[..., :2] = grid.nodes
     clearance = probe.measure(poses).distance
     # no loops around the arena, nor in rooms within walls
-    clearance[~space.inside] = np.minimum(clearance[~space.inside], LOOP_CLEARANCE)
+    clearance[~grid.inside] = np.minimum(clearance[~grid.inside], LOOP_CLEARANCE)
     x, y = poses[:, 0, 0], poses[0, :, 1]
     lines = contourpy.contour_generator(x, y, clearance.T).lines(LOOP_CLEARANCE)
     loops = [_evenly(np.asarray(line)) for line in lines]

@@ -25,7 +25,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.mappings import parse_yaml, to_yaml
 from epuck_mj.mjcf import absolute
 from epuck_mj.motors import Speeds
-from epuck_mj.tasks import START_CLEARANCE
+from epuck_mj.starts import START_CLEARANCE
 from evolution.conditions import Conditions
 from evolution.optimizer import ALGORITHMS, OptimizerParameters, SearchSpace
 from evolution.setting import Setting

@@ -14,7 +14,7 @@ import numpy as np
 from epuck_mj import controller_file, files
 from epuck_mj.control import Policy, TaskParameters
 from epuck_mj.errors import UserError
-from epuck_mj.tasks import START_CLEARANCE
+from epuck_mj.starts import START_CLEARANCE
 from epuck_mj.wall_follower import YARDSTICK, WallFollower
 from evolution.config import ExperimentConfig
 from evolution.config_files import load_config

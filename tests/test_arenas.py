@@ -12,8 +12,7 @@ from epuck_mj.clearance import ClearanceProbe
 from epuck_mj.control import TaskParameters
 from epuck_mj.mjcf import MODELS
 from epuck_mj.model import load_scene
-from epuck_mj.starts import FreeSpace
-from epuck_mj.tasks import START_CLEARANCE
+from epuck_mj.starts import START_CLEARANCE, FreeSpace
 from epuck_mj.wall_follower import WallFollower
 from evolution.held_out import Judge
 
@@ -68,7 +67,8 @@ def test_starts_touch_nothing_and_reach_all_of_the_free_space(path: Path, robot:
     assert ClearanceProbe(scene, 1).measure(starts).distance.min() > (
         START_CLEARANCE - 1e-4
     )
-    nodes = space.origin + space.spacing * np.argwhere(space.inside)
+    grid = space.grid
+    nodes = grid.nodes[grid.inside]
     far, _ = spatial.KDTree(starts[:, :2]).query(nodes)
     # 2,000 starts in two square metres lie a few centimetres apart
     assert far.max() < 0.12

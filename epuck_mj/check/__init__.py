@@ -20,8 +20,7 @@ from epuck_mj.check.walls import finite_findings, plane_findings, wall_findings
 from epuck_mj.errors import UserError
 from epuck_mj.mjcf import find_arena, find_robot
 from epuck_mj.model import Scene, load_scene
-from epuck_mj.starts import FreeSpace, Grid, survey
-from epuck_mj.tasks import START_CLEARANCE
+from epuck_mj.starts import START_CLEARANCE, FreeSpace, Grid, survey
 
 SUBSTEPS_MAX = 10_000
 """Most physics steps in a control step: nobody would wait for more."""

@@ -10,8 +10,7 @@ from epuck_mj.clearance import CLEARANCE_MAX, ClearanceProbe
 from epuck_mj.errors import UserError
 from epuck_mj.model import Scene
 from epuck_mj.outline import shell_outline
-from epuck_mj.starts import FreeSpace, Grid, enclosed
-from epuck_mj.tasks import START_CLEARANCE
+from epuck_mj.starts import START_CLEARANCE, FreeSpace, Grid, enclosed
 
 TOPIC = "room"
 SAMPLE = 64

@@ -17,7 +17,7 @@ from epuck_mj.constants import PROXIMITY_RANGE
 from epuck_mj.geometry import box_around, kinematics, walls
 from epuck_mj.interface import ROBOT_BODY, SHELL, can_touch, static
 from epuck_mj.model import Scene
-from epuck_mj.tasks import START_CLEARANCE
+from epuck_mj.starts import START_CLEARANCE
 
 TOPIC = "walls"
 NAMES_MAX = 6
