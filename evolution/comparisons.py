@@ -13,6 +13,7 @@ import numpy as np
 from scipy import optimize, stats
 
 from evolution.statistics import (
+    CONFIDENCE,
     FEWEST_FOR_INTERVAL,
     Interval,
     bootstrap,
@@ -115,7 +116,7 @@ def a12(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return _wins(a, b).mean(axis=(-1, -2))
 
 
-def a12_interval(a: np.ndarray, b: np.ndarray, confidence: float = 0.95) -> Interval:
+def a12_interval(a: np.ndarray, b: np.ndarray) -> Interval:
     """A12 of `(n,)` over `(m,)` with Newcombe's score interval.
 
     All values of A12 that the samples do not reject, each with the variance it would
@@ -132,7 +133,7 @@ def a12_interval(a: np.ndarray, b: np.ndarray, confidence: float = 0.95) -> Inte
     """
     a, b = checked(a), checked(b)
     value = float(a12(a, b))
-    z = float(stats.norm.ppf((1 + confidence) / 2))
+    z = float(stats.norm.ppf((1 + CONFIDENCE) / 2))
     half = (a.size + b.size) / 2 - 1
 
     def excess(true: float) -> float:
@@ -150,7 +151,7 @@ def a12_interval(a: np.ndarray, b: np.ndarray, confidence: float = 0.95) -> Inte
 
 
 def median_difference(
-    a: np.ndarray, b: np.ndarray, rng: np.random.Generator, confidence: float = 0.95
+    a: np.ndarray, b: np.ndarray, rng: np.random.Generator
 ) -> Interval:
     """Median of `(n,)` minus median of `(m,)`, with a percentile bootstrap.
 
@@ -165,7 +166,7 @@ def median_difference(
     def difference(a: np.ndarray, b: np.ndarray, axis: int) -> np.ndarray:
         return np.median(a, axis=axis) - np.median(b, axis=axis)
 
-    low, high = bootstrap((a, b), difference, "percentile", rng, confidence)
+    low, high = bootstrap((a, b), difference, "percentile", rng)
     return Interval(value, low, high)
 
 

@@ -22,6 +22,9 @@ Of 3, bounds said to hold the truth in 95 % hold it in 90; of 2, in 66.
 FEWEST_FOR_RANKS = 5
 """Pairs below which a rank correlation says nothing: of 4, any order is common."""
 
+CONFIDENCE = 0.95
+"""Probability of all intervals to hold the true value: the 95 % of every text."""
+
 RESAMPLES = 2000
 """Of each bootstrap."""
 
@@ -44,9 +47,7 @@ class Interval:
     high: float
 
 
-def mean_interval(
-    sample: np.ndarray, rng: np.random.Generator, confidence: float = 0.95
-) -> Interval:
+def mean_interval(sample: np.ndarray, rng: np.random.Generator) -> Interval:
     """Mean of `(n,)` with a BCa bootstrap; a constant sample has a mean without doubt.
 
     Source: Efron 1987, "Better bootstrap confidence intervals".
@@ -57,11 +58,11 @@ def mean_interval(
         return Interval(value, math.nan, math.nan)
     if np.ptp(sample) == 0:
         return Interval(value, value, value)
-    low, high = bootstrap((sample,), np.mean, "BCa", rng, confidence)
+    low, high = bootstrap((sample,), np.mean, "BCa", rng)
     return Interval(value, low, high)
 
 
-def wilson(successes: int, n: int, confidence: float = 0.95) -> Interval:
+def wilson(successes: int, n: int) -> Interval:
     """Share of successes with Wilson's interval.
 
     Source: Wilson 1927, without continuity correction.
@@ -71,7 +72,7 @@ def wilson(successes: int, n: int, confidence: float = 0.95) -> Interval:
     """
     check_successes(successes, n)
     test = stats.binomtest(successes, n)
-    low, high = test.proportion_ci(confidence, method="wilson")
+    low, high = test.proportion_ci(CONFIDENCE, method="wilson")
     return Interval(successes / n, float(low), float(high))
 
 
@@ -135,7 +136,6 @@ def bootstrap(
     statistic: Callable,
     method: str,
     rng: np.random.Generator,
-    confidence: float,
 ) -> tuple[float, float]:
     """Bounds of a statistic over resamples of each sample.
 
@@ -144,7 +144,6 @@ def bootstrap(
         statistic: of arrays `(..., n)` along an `axis`, `(...)`.
         method: as scipy calls it.
         rng: draws the resamples.
-        confidence: probability to hold the true value.
     """
     interval = stats.bootstrap(
         samples,
@@ -152,7 +151,7 @@ def bootstrap(
         n_resamples=RESAMPLES,
         batch=BATCH,
         vectorized=True,
-        confidence_level=confidence,
+        confidence_level=CONFIDENCE,
         method=method,
         rng=rng,
     ).confidence_interval

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from evolution.statistics import RESAMPLES, Interval, checked
+from evolution.statistics import CONFIDENCE, RESAMPLES, Interval, checked
 
 
 def evaluations_to_target(
@@ -57,7 +57,6 @@ def expected_running_time_interval(
     hits: np.ndarray,
     spent: np.ndarray,
     rng: np.random.Generator,
-    confidence: float = 0.95,
 ) -> Interval:
     """The expected running time with a percentile bootstrap over runs.
 
@@ -73,7 +72,7 @@ def expected_running_time_interval(
     times = np.full(RESAMPLES, math.inf)
     np.divide(total, successes, out=times, where=successes > 0)
     # inf has no neighbours to interpolate between
-    tail = (1 - confidence) / 2
+    tail = (1 - CONFIDENCE) / 2
     low, high = np.quantile(times, [tail, 1 - tail], method="inverted_cdf")
     return Interval(value, float(low), float(high))
 

@@ -194,9 +194,9 @@ def test_separated_samples_have_a_one_sided_bound():
     assert interval.low < more.low < 1
 
 
-@given(SAMPLES, SAMPLES, st.sampled_from([0.5, 0.9, 0.95]))
-def test_a12_intervals_are_mirrored_and_inside(a, b, confidence):
-    interval, mirrored = a12_interval(a, b, confidence), a12_interval(b, a, confidence)
+@given(SAMPLES, SAMPLES)
+def test_a12_intervals_are_mirrored_and_inside(a, b):
+    interval, mirrored = a12_interval(a, b), a12_interval(b, a)
     assert 0 <= interval.low <= interval.value <= interval.high <= 1
     assert interval.low < interval.high
     assert interval.low == pytest.approx(1 - mirrored.high, abs=1e-9)
