@@ -15,7 +15,7 @@ import numpy as np
 from mujoco.batch import Batch
 
 from epuck_mj.errors import UserError
-from epuck_mj.geometry import walls
+from epuck_mj.geometry import mesh, walls
 from epuck_mj.interface import SHELL
 from epuck_mj.model import Scene
 
@@ -155,7 +155,6 @@ def _copy(spec, body, model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> 
         conaffinity=0,
     )
     if model.geom_type[geom] == _SHAPE.mjGEOM_MESH:
-        mesh = model.mesh(model.geom_dataid[geom])
-        vertices = model.mesh_vert[mesh.vertadr[0] :][: mesh.vertnum[0]]
+        vertices, _ = mesh(model, geom)
         copy.meshname = f"mesh of geom {geom}"
         spec.add_mesh(name=copy.meshname, uservert=vertices.ravel())

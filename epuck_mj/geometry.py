@@ -13,6 +13,22 @@ COLLISION_GROUP = 3
 """First group of geoms that are not meant to be seen, as in mujoco_menagerie."""
 
 
+def at_rest(model: mujoco.MjModel) -> mujoco.MjData:
+    """Where everything is before anything moves."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return data
+
+
+def mesh(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices `(n, 3)` [m] and faces `(m, 3)` of a geom that is a mesh."""
+    found = model.mesh(model.geom_dataid[geom])
+    return (
+        model.mesh_vert[found.vertadr[0] :][: found.vertnum[0]],
+        model.mesh_face[found.faceadr[0] :][: found.facenum[0]],
+    )
+
+
 def walls(model: mujoco.MjModel) -> np.ndarray:
     """Which geoms stand still and can be hit by the robot's shell, `(ngeom,)`."""
     return can_touch(model, model.geom(SHELL).id) & static(model)
@@ -33,8 +49,7 @@ def box_around(
     geoms = geoms & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
     if not geoms.any():
         return None
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    data = at_rest(model)
     box, rotation = model.geom_aabb[geoms], data.geom_xmat[geoms].reshape(-1, 3, 3)
     center = data.geom_xpos[geoms] + np.einsum("nij,nj->ni", rotation, box[:, :3])
     half = np.einsum("nij,nj->ni", np.abs(rotation), box[:, 3:])

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from epuck_mj.geometry import walls
+from epuck_mj.geometry import at_rest, mesh, walls
 from epuck_mj.interface import SHELL
 from epuck_mj.model import Scene
 
@@ -13,8 +13,7 @@ OUTLINE_POINTS = 64
 
 def wall_outlines(scene: Scene) -> list[np.ndarray]:
     """What stands still and the shell can hit, from above: `(points, 2)` each [m]."""
-    model, data = scene.model, mujoco.MjData(scene.model)
-    mujoco.mj_kinematics(model, data)
+    model, data = scene.model, at_rest(scene.model)
     solid = walls(model) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
     return [
         _outline(model, geom, data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3))
@@ -50,8 +49,7 @@ def _outline(
             points = size[0] * _unit(directions * [1, 1, 0])
             points[:, 2] = size[1] * np.sign(directions[:, 2])
         case mujoco.mjtGeom.mjGEOM_MESH:
-            mesh = model.mesh(model.geom_dataid[geom])
-            vertices = model.mesh_vert[mesh.vertadr[0] :][: mesh.vertnum[0]]
+            vertices, _ = mesh(model, geom)
             points = vertices[np.argmax(directions @ vertices.T, axis=1)]
         case _:
             center, half = model.geom_aabb[geom].reshape(2, 3)

@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull, QhullError
 from epuck_mj.check.findings import Finding, Place, error, info, warning
 from epuck_mj.clearance import CONVEX
 from epuck_mj.constants import PROXIMITY_RANGE
-from epuck_mj.geometry import box_around, kinematics, walls
+from epuck_mj.geometry import at_rest, box_around, kinematics, mesh, walls
 from epuck_mj.interface import ROBOT_BODY, SHELL, can_touch, static
 from epuck_mj.model import Scene
 from epuck_mj.starts import START_CLEARANCE
@@ -42,8 +42,7 @@ class Heights:
 
 def finite_findings(model: mujoco.MjModel, places: tuple[Place, ...]) -> list[Finding]:
     """Geoms that are nowhere: with them, nothing can be measured."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    data = at_rest(model)
     values = np.concatenate([data.geom_xpos, data.geom_xmat, model.geom_size], axis=1)
     nowhere = ~(np.abs(values) < FAR).all(axis=1)
     return [
@@ -55,8 +54,7 @@ def finite_findings(model: mujoco.MjModel, places: tuple[Place, ...]) -> list[Fi
 def plane_findings(model: mujoco.MjModel, places: tuple[Place, ...]) -> list[Finding]:
     """Planes that the shell would hit: no scene can be made with them."""
     planes = (model.geom_type == _SHAPE.mjGEOM_PLANE) & walls(model)
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    data = at_rest(model)
     return [
         error(
             TOPIC,
@@ -179,9 +177,7 @@ def _no_wall(
 ) -> list[Finding]:
     """What is wrong with a geom that stands still and the shell cannot hit."""
     if model.geom_type[geom] == _SHAPE.mjGEOM_PLANE:
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        in_sight = abs(data.geom_xmat[geom][8]) < 1 - 1e-9
+        in_sight = abs(at_rest(model).geom_xmat[geom][8]) < 1 - 1e-9
     else:
         low, high = _extent(model, geom)
         in_sight = low < heights.rays[1] and high > heights.rays[0]
@@ -207,9 +203,8 @@ def _mesh(model: mujoco.MjModel, geom: int, place: Place) -> list[Finding]:
     """Whether a wall is a mesh with hollows: hit as its hull, seen as it is."""
     if model.geom_type[geom] != _SHAPE.mjGEOM_MESH:
         return []
-    mesh = model.mesh(model.geom_dataid[geom])
-    vertices = model.mesh_vert[mesh.vertadr[0] :][: mesh.vertnum[0]].astype(float)
-    corners = vertices[model.mesh_face[mesh.faceadr[0] :][: mesh.facenum[0]]]
+    vertices, faces = mesh(model, geom)
+    corners = vertices.astype(float)[faces]
     volume = abs(np.linalg.det(corners).sum()) / 6
     try:
         hull = ConvexHull(vertices).volume

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import rerun as rr
 
-from epuck_mj.geometry import arena_box, color, drawn, moving_bodies
+from epuck_mj.geometry import arena_box, at_rest, color, drawn, mesh, moving_bodies
 from epuck_mj.interface import ROBOT_BODY
 from epuck_mj.recording.entities import ARENA, Entities
 
@@ -18,8 +18,7 @@ MARK_HEIGHT = 0.085
 
 def log_arena(stream: rr.RecordingStream, model: mujoco.MjModel) -> None:
     """All that stands still, where it stands."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    data = at_rest(model)
     for geom in _drawn(model, moving=False):
         quaternion = np.zeros(4)
         mujoco.mju_mat2Quat(quaternion, data.geom_xmat[geom])
@@ -91,9 +90,7 @@ def _shape(model: mujoco.MjModel, geom: int) -> rr.AsComponents:
         radii = size[[0, 0, 0]] if kind == mujoco.mjtGeom.mjGEOM_SPHERE else size
         return rr.Ellipsoids3D(half_sizes=[radii], colors=colors, fill_mode=solid)
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
-        mesh = model.mesh(model.geom_dataid[geom])
-        vertices = model.mesh_vert[mesh.vertadr[0] :][: mesh.vertnum[0]]
-        faces = model.mesh_face[mesh.faceadr[0] :][: mesh.facenum[0]]
+        vertices, faces = mesh(model, geom)
         return rr.Mesh3D(
             vertex_positions=vertices, triangle_indices=faces, albedo_factor=colors[0]
         )
