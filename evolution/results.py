@@ -103,8 +103,8 @@ def summary(controller: ControllerFile) -> str:
 
 def scores(controller: ControllerFile) -> str:
     """The same in short."""
-    scores = controller.scores
-    return f"held-out {_held_out(scores['held_out'])}; stored {scores['stored']:.1f}"
+    found = controller.scores
+    return f"held-out {_held_out(found['held_out'])}; stored {found['stored']:.1f}"
 
 
 def _held_out(tests: Mapping[str, Any]) -> str:

@@ -20,7 +20,7 @@ from epuck_mj.wall_follower import YARDSTICK, WallFollower
 from evolution.execution import Means
 from evolution.jobs import Event, Job, carry_out_side_by_side
 from evolution.results import judges, scores
-from evolution.run_directory import locked
+from evolution.run_directory import RunDirectory, locked
 from evolution.study_config import StudyConfig, find_study, parse_seeds
 from evolution.study_directory import PATIENCE, StudyDirectory
 
@@ -199,7 +199,9 @@ def _shown(
 
 def _line(job: Job) -> str:
     """What a finished run has found."""
-    return f"{job}: " + scores(controller_file.load(job.directory / "champion.json"))
+    return f"{job}: " + scores(
+        controller_file.load(RunDirectory(job.directory).champion)
+    )
 
 
 if __name__ == "__main__":

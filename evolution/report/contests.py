@@ -73,7 +73,7 @@ def _pair_table(rows: Sequence[PairRow]) -> Table:
                 label(row.b),
                 f"{row.n_a}, {row.n_b}",
                 f"{row.median_a:.1f}, {row.median_b:.1f}",
-                f"{row.median_difference:.1f} "
+                f"{row.median_difference:z.1f} "
                 + between(row.median_difference_low, row.median_difference_high, ".1f"),
                 f"{row.a12:.2f} {between(row.a12_low, row.a12_high)}",
                 probability(row.p).removeprefix("= "),

@@ -149,8 +149,7 @@ def numbers(row: PairRow) -> str:
     """A pair of experiments in numbers."""
     return (
         f"medians {row.median_a:.1f} and {row.median_b:.1f}, difference "
-        # no negative zero
-        f"{round(row.median_difference, 1) + 0.0:.1f} "
+        f"{row.median_difference:z.1f} "
         + between(row.median_difference_low, row.median_difference_high, ".1f")
         + f"; A12 {row.a12:.2f} {between(row.a12_low, row.a12_high)}; "
         f"p {probability(row.p)}, Holm {probability(row.p_holm)}"

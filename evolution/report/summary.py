@@ -29,6 +29,7 @@ from evolution.report.tables import (
     target_rows,
 )
 from evolution.report.words import command_line, label
+from evolution.run_directory import RunDirectory
 from evolution.statistics import quartiles, rank_correlation
 from evolution.study_data import StudyData
 
@@ -66,7 +67,7 @@ def commands(data: StudyData, output: str, ioh: bool) -> dict[str, str]:
         "the hand-written wall follower": command_line("evolution.evaluate", YARDSTICK),
         "one run, byte for byte (any other likewise)": command_line(
             "evolution.run",
-            (run.path / "config.yaml").as_posix(),
+            RunDirectory(run.path).config.as_posix(),
             "--output",
             f"runs/again-{run.path.parent.name}-{run.seed}",
         ),

@@ -43,7 +43,7 @@ def robot_name(robot: str) -> str:
     return ROBOTS.get(robot, robot)
 
 
-def spread(sample: np.ndarray, scale: float = 1.0, form: str = ".1f") -> str:
+def spread(sample: np.ndarray, scale: float = 1.0, form: str = "z.1f") -> str:
     """Median and quartiles of `(n,)`; the value alone of one run."""
     if not sample.size:
         return NOTHING
