@@ -75,6 +75,11 @@ class Interruption:
             if self.signum is not None:
                 raise Interrupted
             yield
+        except Exception as error:
+            # whatever was interrupted may have failed to clear up
+            if _follows_interruption(error):
+                raise Interrupted from error
+            raise
         finally:
             self._raises = False
 
@@ -84,6 +89,14 @@ class Interruption:
         if self._raises:
             self._raises = False
             raise Interrupted
+
+
+def _follows_interruption(error: BaseException) -> bool:
+    """Whether it was raised on the way out of an interruption."""
+    cause = error.__context__
+    while cause is not None and not isinstance(cause, Interrupted):
+        cause = cause.__context__
+    return cause is not None
 
 
 @contextmanager

@@ -374,7 +374,7 @@ def test_a_champion_of_another_network(tmp_path):
     )
     path = tmp_path / "champion.json"
     path.write_text(file.to_json().replace('"hidden": 5', '"hidden": 4'))
-    with pytest.raises(UserError, match="expected 40 finite genes, got 50"):
+    with pytest.raises(UserError, match=r"expected 40 genes, got \(50,\)"):
         bridge([str(path), "--port", "x"])
 
 
@@ -469,6 +469,35 @@ def test_a_second_signal_breaks_nothing_off(handlers):
             signal.raise_signal(signal.SIGTERM)
             signal.raise_signal(signal.SIGINT)
     assert interruption.signum == signal.SIGINT
+
+
+def test_what_fails_to_clear_up_hides_no_signal(handlers):
+    """As zipfile does, where it is interrupted in the middle of a file."""
+    with (
+        Interruption() as interruption,
+        pytest.raises(Interrupted) as caught,
+        interruption.raising(),
+    ):
+        try:
+            try:
+                signal.raise_signal(signal.SIGINT)
+            finally:
+                raise ValueError("an open writing handle")
+        except ValueError as error:
+            raise UserError("cannot be written") from error
+    assert isinstance(caught.value.__cause__, UserError)
+
+
+def test_other_mistakes_stay_what_they_are(handlers):
+    with (
+        Interruption() as interruption,
+        pytest.raises(UserError),
+        interruption.raising(),
+    ):
+        try:
+            raise KeyError("a")
+        except KeyError:
+            raise UserError("b") from None
 
 
 def test_without_a_signal_handlers_are_as_before(handlers):
