@@ -42,7 +42,11 @@ DIFFERENCES = (
         "0 near to 1 free, 4 cm",
         "the same, linear along eight rays at the data sheet's angles, without noise",
     ),
-    ("crash", "not said what counts", "the shell touches a wall"),
+    (
+        "crash",
+        "not said what counts",
+        "the shell touches a wall at the end of a control step",
+    ),
     (
         "fitness",
         "equation (2), which as printed rewards circles in the open",
