@@ -77,7 +77,11 @@ class Everybody:
         return self
 
 
-def judging(threads: int = 0) -> Callable[[str, Setting], "Judge"]:
+Judging = Callable[[str, Setting], "Judge"]
+"""Gives the judge of a robot in a setting."""
+
+
+def judging(threads: int = 0) -> Judging:
     """Gives the judge of a robot in a setting, the same one again: they take a second.
 
     Args:

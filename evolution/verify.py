@@ -6,7 +6,7 @@ fitness differs, what else differs is named.
 
 import json
 import platform
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -20,10 +20,9 @@ from epuck_mj.errors import UserError
 from evolution.champion import held_out_disturbances
 from evolution.config import ExperimentConfig
 from evolution.experiment import Purpose
-from evolution.held_out import Judge, judging
+from evolution.held_out import Judging, judging
 from evolution.provenance import processor
 from evolution.run_directory import RunDirectory
-from evolution.setting import Setting
 from evolution.study_data import check_scores
 from evolution.study_directory import champions
 
@@ -77,7 +76,7 @@ def _runs(path: Path) -> list[RunDirectory]:
     return [RunDirectory(champion.parent) for champion in found]
 
 
-def _verified(run: RunDirectory, judge: Callable[[str, Setting], Judge]) -> bool:
+def _verified(run: RunDirectory, judge: Judging) -> bool:
     """Whether all scores are the same; says so, or what differs."""
     config, champion = run.stored_config(), controller_file.load(run.champion)
     check_scores(champion.scores, run.champion)
@@ -100,7 +99,7 @@ def _verified(run: RunDirectory, judge: Callable[[str, Setting], Judge]) -> bool
 def _differing(
     champion: ControllerFile,
     config: ExperimentConfig,
-    judge: Callable[[str, Setting], Judge],
+    judge: Judging,
 ) -> Iterator[str]:
     """What of the champion's held-out evaluations is not what is written."""
     for kind in ("held_out", "held_out_as_evolved"):
@@ -131,7 +130,7 @@ def _most_believed(
     run: RunDirectory,
     champion: ControllerFile,
     config: ExperimentConfig,
-    judge: Callable[[str, Setting], Judge],
+    judge: Judging,
 ) -> Iterator[str]:
     """Whether the individual with the highest stored fitness has another fitness."""
     written = champion.scores.get("most_believed")
@@ -151,7 +150,7 @@ def _most_believed(
 def _edited(
     champion: ControllerFile,
     config: ExperimentConfig,
-    judge: Callable[[str, Setting], Judge],
+    judge: Judging,
 ) -> Iterator[str]:
     """Whether robot or arena have been edited since."""
     now = dict(judge(config.robot, config.setting).scene.sha256)

@@ -190,6 +190,10 @@ def test_rank_correlations_of_hand_made_worlds():
     for few in (range(4), [5]):
         assert rank_correlations(transfer, few) is None
         assert between_robots(transfer, transfer, few) is None
+    # none at all is a correlation, too
+    unrelated = np.array([[2.0, 5.0, 3.0, 1.0, 4.0]] * 2)
+    found = rank_correlations(Transfer(home, *[unrelated] * 3), fast)
+    assert found == pytest.approx({"home": 0.0, "worlds": 1.0})
     alike = Transfer(np.ones(5), *[np.ones((3, 5))] * 3)
     assert rank_correlations(alike, fast) is between_robots(alike, alike, fast) is None
 

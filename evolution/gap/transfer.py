@@ -117,13 +117,14 @@ def rank_correlations(
     worlds, the mean over all pairs. Worlds where all fare alike say nothing.
     """
     home, fitness = transfer.home[members], transfer.fitness[:, members]
-    own = [rank_correlation(home, world) for world in fitness]
-    told = fitness[np.ptp(fitness, axis=1) > 0]
-    if len(told) < 2 or not any(own):
+    found = [rank_correlation(home, world) for world in fitness]
+    own = [each for each in found if each is not None]
+    if len(own) < 2:
         return None
+    told = fitness[np.ptp(fitness, axis=1) > 0]
     between = np.corrcoef(stats.rankdata(told, axis=1))
     return {
-        "home": float(np.mean([each for each in own if each is not None])),
+        "home": float(np.mean(own)),
         "worlds": float(between[np.triu_indices(len(told), 1)].mean()),
     }
 

@@ -63,15 +63,15 @@ def claims(study: StudyData) -> list[Claim]:
     """All claims of the paper, held against a study."""
     stored = _samples(study, lambda name: best_stored(study, name))
     shares = _samples(study, lambda name: 100 * mean_to_best(study, name))
+    where = "in the mean's share of the best [%]"
+    in_shares = _orders(_pairs(study, shares), shares, where)
     early = _samples(study, lambda name: 100 * maturity(study, name))
     found = [
         *_orders(_pairs(study, stored), stored, "in best (stored) fitness"),
         *(_maximum(stored, name) for name in PAPER_BEST),
         *(_approaches(shares, name) for name in ("de-best", "de-rand")),
         _stays_apart(shares),
-        *_orders(_pairs(study, shares), shares, "in the mean's share of the best [%]")[
-            1:
-        ],
+        *in_shares[1:],
         *(_mature_early(early, name) for name in ("de-best", "de-rand")),
         *(_follows(study, name) for name in PAPERS),
     ]
