@@ -66,7 +66,8 @@ def stored_and_held_out(data: StudyData) -> tuple[Figure, str]:
     caption = (
         f"Stored and held-out fitness of each champion ({counts(data)}). The black "
         "bar is what evolution believed of it; the vertical distance from there down "
-        f"to a dot is the luck that it kept. {CHAMPION}"
+        "to the filled mark, the robot it evolved on, is the luck that it kept. "
+        f"{CHAMPION}"
     )
     if any(disturbed(data, name) for name in runs):
         caption += (
