@@ -1,8 +1,9 @@
 """CMA-ES with restarts, maximising: the package `cmaes` behind ask and tell.
 
 Each start is a `cmaes.CMA` at a random mean in the initial range. When it has nothing
-left to find, the next generation starts another one with twice the population. A
-genome outside the bounds is drawn again up to 100 times, then clipped, by `cmaes`.
+left to find, or only noise, the next generation starts another one with twice the
+population. `cmaes` sees the former; the latter is `evolution/stagnation.py`. A genome
+outside the bounds is drawn again up to 100 times, then clipped, by `cmaes`.
 
 A `cmaes.CMA` cannot be saved without pickle or its private attributes. But it is a
 function of its seed and of what it was told: that is the state, and it is restored by
@@ -30,6 +31,7 @@ from evolution.ask_tell import (
     restored_generator,
 )
 from evolution.search_space import SearchSpace, refuse_wide_steps
+from evolution.stagnation import has_stagnated, stagnation_window
 
 # With a single parent, half of 3, `cmaes` divides by a learning rate of 0.
 MIN_POPULATION = 4
@@ -57,7 +59,7 @@ class CmaEsParameters:
         population: individuals of a generation (lambda), at least 4; doubled by each
             restart. The tutorial's default for 40 genes is 15.
         sigma: first step size of each start, above 0, at most the width of the bounds.
-        restarts: start again when `cmaes` sees no more progress; otherwise go on.
+        restarts: start again when there is no more progress; otherwise go on.
         algorithm: what it is, for configurations.
 
     Raises:
@@ -115,9 +117,10 @@ class CmaEs(Optimizer):
         # it minimises
         costs = (-made_finite(told)).tolist()
         self._cma.tell(list(zip(asked, costs, strict=True)))
-        if self._parameters.restarts and self._cma.should_stop():
-            self._cma = self._started(2 * self._cma.population_size)
         self._told.append(told)
+        self._history.append((told.max(), np.sort(told)[len(told) // 2]))
+        if self._parameters.restarts and self._should_stop():
+            self._cma = self._started(2 * self._cma.population_size)
         self.population, self.fitness = read_only(asked), read_only(told)
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
@@ -155,8 +158,19 @@ class CmaEs(Optimizer):
             "generator": self._birth.copy(),
         }
 
+    def _should_stop(self) -> bool:
+        """Whether the present start has nothing left to find, or only noise."""
+        window = stagnation_window(
+            len(self._history), self._space.genes, self._cma.population_size
+        )
+        # not the whole of it: it is made an array in every generation
+        recent = np.array(self._history[-window:])
+        return self._cma.should_stop() or has_stagnated(recent, window)
+
     def _started(self, population: int) -> CMA:
-        """A new search of that population at a random mean."""
+        """A new search of that population at a random mean, without a history."""
+        # fitness of the best and of the median individual of each of its generations
+        self._history: list[tuple[float, float]] = []
         space = self._space
         mean = self._rng.uniform(space.init_lower, space.init_upper, size=space.genes)
         return CMA(

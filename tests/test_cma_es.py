@@ -6,6 +6,7 @@ from cmaes import CMA
 
 from evolution.cma_es import CmaEs, CmaEsParameters, made_finite
 from evolution.search_space import SearchSpace
+from evolution.stagnation import has_stagnated, stagnation_window
 
 SPACE = SearchSpace(genes=3, lower=-5, upper=5, init_lower=-5, init_upper=5)
 
@@ -153,6 +154,63 @@ def test_it_restarts_when_the_sphere_is_solved():
     assert evolve(optimizer, 1).fitness.max() < -0.01
 
 
+def test_the_window_by_hand():
+    # the source's 120 + 30 n / lambda at first, and a fifth of a long start
+    assert stagnation_window(1, genes=40, population=15) == 200
+    assert stagnation_window(1000, genes=40, population=15) == 200
+    assert stagnation_window(1500, genes=40, population=15) == 300
+    assert stagnation_window(1, genes=40, population=1200) == 121
+    assert stagnation_window(10**6, genes=40, population=15) == 20000
+
+
+def test_stagnation_by_hand():
+    rising, flat = np.arange(10.0), np.zeros(10)
+    falling, late = -rising, np.repeat([0.0, 1.0], [8, 2])
+
+    def stagnated(*columns, window=10):
+        return has_stagnated(np.transpose(columns), window)
+
+    assert stagnated(flat, flat)
+    assert stagnated(falling, flat)
+    # one of them is enough to go on
+    assert not stagnated(rising, flat)
+    assert not stagnated(falling, rising)
+    # the medians of 0, 0, 0 and of 0, 1, 1
+    assert not stagnated(late, flat)
+    # one lucky generation is not progress
+    assert stagnated(np.repeat([0.0, 9.0], [9, 1]), flat)
+    # what was before the window does not count, and a short history says nothing
+    assert stagnated(np.repeat([0.0, 1.0], [2, 8]), flat, window=8)
+    assert not stagnated(flat, flat, window=11)
+    infinite = np.repeat([-np.inf, np.inf], 5)
+    assert not stagnated(infinite, flat)
+    assert stagnated(infinite[::-1], np.full(10, -np.inf))
+
+
+def noise(seed: int):
+    rng = np.random.default_rng(seed)
+    return lambda genomes: rng.random(len(genomes))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_it_restarts_when_all_that_is_left_is_noise(seed):
+    optimizer, fitness = make(seed), noise(seed)
+    generations = sizes(optimizer, 600, fitness)
+    # 120 + 30 * 3 / 6 generations at least
+    assert generations[:135] == [6] * 135
+    assert {6, 12} <= set(generations)
+    assert set(sizes(make(seed, restarts=False), 600, noise(seed))) == {6}
+
+
+def test_progress_below_the_noise_is_progress():
+    optimizer, noisy = make(), noise(0)
+
+    def rising(genomes):
+        return noisy(genomes) + 0.01 * optimizer.generation
+
+    assert set(sizes(optimizer, 600, rising)) == {6}
+
+
 def test_without_restarts_it_goes_on():
     assert sizes(make(restarts=False), 300, flat) == [6] * 300
     optimizer = evolve(make(restarts=False), 1000)
@@ -173,6 +231,19 @@ def test_replay_is_exact_around_and_across_restarts(n_before, next_size):
     resumed.restore(state)
     assert resumed.next_size() == next_size
     assert_same(resumed, evolve(make(), n_before, flat))
+
+
+def test_replay_is_exact_across_stagnation():
+    optimizer, fitness = make(), noise(0)
+    while optimizer.next_size() == 6:
+        evolve(optimizer, 1, fitness)
+    # the next start remembers its own generations only
+    evolve(optimizer, 100, fitness)
+    resumed = evolve(make(seed=9), 200, noise(1))
+    resumed.restore(optimizer.state())
+    rest = noise(2), noise(2)
+    assert sizes(resumed, 400, rest[0]) == sizes(optimizer, 400, rest[1])
+    assert_same(resumed, optimizer)
 
 
 def test_a_restored_state_is_a_state():
