@@ -53,6 +53,7 @@ NUMPY_ONLY = {
     "evolution/genetic_algorithm.py",
     "evolution/random_search.py",
     "evolution/evolution_strategy.py",
+    "evolution/stagnation.py",
 }
 """Where numpy is the only package from outside."""
 
