@@ -4,6 +4,7 @@ BIN := .venv/bin
 INSTALLED := .venv/.installed
 RUN := runs/de-best-seed-1
 CHAMPION := results/paper/de-best/seed-1
+PAPERS := de-best de-rand ga
 
 .PHONY: run test bench convergence racing overhead recording bridge gap results figures clean
 
@@ -41,8 +42,8 @@ bridge: $(INSTALLED)
 
 # champions of three seeds of each experiment in pseudo-realities, on both robots
 gap: $(INSTALLED)
-	$(BIN)/python -m evolution.gap $(wildcard results/paper/*/seed-[123]) \
-	  results/transfer wall-follower --output results/gap
+	$(BIN)/python -m evolution.gap \
+	  $(wildcard $(PAPERS:%=results/paper/%/seed-[123])) results/transfer wall-follower --output results/gap
 
 # what git keeps of the studies in runs/, and everything that is made of it
 results: $(INSTALLED)

@@ -41,7 +41,8 @@ def load(
     Args:
         task_name: one of `SUITE`.
         task_kwargs: arguments of the task's function below.
-        environment_kwargs: arguments of `dm_control.rl.control.Environment`.
+        environment_kwargs: arguments of `dm_control.rl.control.Environment`, but for
+            `n_sub_steps` and `time_limit`, which the task knows.
 
     Raises:
         UserError: if there is no such task, or robot or arena cannot be used.
@@ -70,7 +71,11 @@ def follow_walls(
         parameters: steps, control step, fitness, sensor range, speeds.
         start_clearance: least distance from the shell to a wall at a start [m].
         random: seed of the starts, or a generator to draw them from.
-        environment_kwargs: arguments of `dm_control.rl.control.Environment`.
+        environment_kwargs: arguments of `dm_control.rl.control.Environment`, but for
+            `n_sub_steps` and `time_limit`, which the task knows.
+
+    Raises:
+        UserError: if robot or arena cannot be used.
     """
     parameters = parameters or TaskParameters()
     scene = load_scene(robot, arena, parameters.control_step)

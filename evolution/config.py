@@ -175,6 +175,11 @@ class ExperimentConfig(BaseModel):
         )
 
     @property
+    def budget(self) -> int:
+        """Trials that evolution may cost."""
+        return self.evaluations * self.trials
+
+    @property
     def setting(self) -> Setting:
         """In what the trials are lived."""
         return Setting(self.arena, self.task, self.start_clearance)

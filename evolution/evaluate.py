@@ -36,8 +36,8 @@ class Options:
         generations: instead of champions, the best individuals of these generations of
             runs: numbers from 0 on and last, with commas in between.
         starts: how many test starts: the first of always the same.
-        robot: robot to test on; the one it evolved on and the one on wheels if not
-            given.
+        robot: robot to test on; the one it evolved on, and of the two shipped ones the
+            other, if not given.
         arena: arena to test in; the one it evolved in if not given.
         noise: none for ideal sensors and motors; calibrated or strong for real ones.
         randomise: another robot in each trial; needs noise.

@@ -140,7 +140,9 @@ class Experiment:
             self._disturbances(generation),
         )
         self.optimizer.tell(evaluation.fitness)
-        fitness = self.optimizer.fitness
+        # the worst there is, what NaN counts as, is no number for a mean
+        stored = self.optimizer.fitness
+        fitness = np.where(np.isneginf(stored), 0.0, stored)
         record = Record(
             generation=generation,
             evaluations=self.evaluations + len(genomes),

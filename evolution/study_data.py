@@ -81,8 +81,9 @@ class StudyData:
         return {name: self.runs[name] for name in self.configs if self.runs.get(name)}
 
     def alike(self, a: str, b: str) -> bool:
-        """Whether fitness of two experiments is worth the same."""
-        return self.configs[a].setting == self.configs[b].setting
+        """Whether fitness of two experiments is worth the same, and costs the same."""
+        one, other = self.configs[a], self.configs[b]
+        return one.setting == other.setting and one.budget == other.budget
 
     def yardstick_mean(self, robot: str) -> float | None:
         """Held-out fitness of the hand-written wall follower, None if not known."""
@@ -95,6 +96,10 @@ class StudyData:
     def stored(self, name: str) -> np.ndarray:
         """Stored fitness of an experiment's champions, `(runs,)`."""
         return np.array([run.stored for run in self.runs[name]])
+
+    def best_stored(self, name: str) -> np.ndarray:
+        """Highest stored fitness that each run has seen, `(runs,)`: the paper's."""
+        return np.array([run.history["best"].max() for run in self.runs[name]])
 
 
 def load_study(path: Path) -> StudyData:
@@ -144,6 +149,12 @@ def load_study(path: Path) -> StudyData:
         missing.append(
             f"comparisons with {first}: arena, task or start clearance of "
             f"{', '.join(differing)} are others"
+        )
+    unequal = [n for n in others if configs[n].budget != configs[first].budget]
+    if unequal:
+        missing.append(
+            f"comparisons with {first}: evaluations times trials of "
+            f"{', '.join(unequal)} are others"
         )
     try:
         if not differing:

@@ -8,7 +8,13 @@ import math
 
 import numpy as np
 
-from evolution.statistics import CONFIDENCE, RESAMPLES, Interval, checked
+from evolution.statistics import (
+    CONFIDENCE,
+    FEWEST_FOR_INTERVAL,
+    RESAMPLES,
+    Interval,
+    checked,
+)
 
 
 def evaluations_to_target(
@@ -61,11 +67,11 @@ def expected_running_time_interval(
     """The expected running time with a percentile bootstrap over runs.
 
     A resample without a success takes forever, so the upper bound is inf where few
-    runs hit. The bounds are nan for one run, and inf if none hit.
+    runs hit. The bounds are nan below 5 runs, and inf if none hit.
     """
     cost, hit = _cost(hits, spent)
     value = expected_running_time(hits, spent)
-    if hit.size < 2:
+    if hit.size < FEWEST_FOR_INTERVAL:
         return Interval(value, math.nan, math.nan)
     drawn = rng.integers(hit.size, size=(RESAMPLES, hit.size))
     total, successes = cost[drawn].sum(axis=-1), hit[drawn].sum(axis=-1)

@@ -23,12 +23,15 @@ from evolution.report.pairs import pair_rows, pairs_of
 from evolution.report.reproduction import reproduction
 from evolution.report.verdicts import (
     CONSISTENT,
+    HANGS_ON_READING,
     INCONSISTENT,
+    NOT_CONTRADICTED,
     NOT_MEASURED,
     OTHER_STUDY,
     TOO_FEW,
     UNDECIDED,
     chance_of_best,
+    fewest_to_contradict,
     of_best,
     of_most,
 )
@@ -104,7 +107,7 @@ def test_a_study_like_the_paper_is_consistent_with_its_order_and_maxima():
     for better, worse in (("DE/best", "DE/rand"), ("DE/rand", "GA"), ("DE/best", "GA")):
         assert verdict(found, f"{better}", "exceeds", worse, "stored") == CONSISTENT
     for maximum in ("246.66", "215.217", "202.775"):
-        assert verdict(found, maximum) == CONSISTENT
+        assert verdict(found, maximum) == NOT_CONTRADICTED
 
 
 def test_the_opposite_order_is_inconsistent():
@@ -212,6 +215,19 @@ def test_quantities_by_hand():
     assert verdict(claims(late), "DE/best", "mature") == INCONSISTENT
 
 
+@pytest.mark.parametrize(
+    ("mature_after", "expected"),
+    [(0.3, CONSISTENT), (0.4, HANGS_ON_READING), (0.6, INCONSISTENT)],
+)
+def test_early_is_read_leniently_and_strictly(mature_after, expected):
+    data = study(LIKE_THE_PAPER)
+    for each in data.runs["de-best"]:
+        spent = each.history["evaluations"] / 1000
+        each.history["best"][:] = np.where(spent >= mature_after, 245.0, 100.0)
+    np.testing.assert_allclose(maturity(data, "de-best"), mature_after)
+    assert verdict(claims(data), "DE/best", "mature") == expected
+
+
 def test_the_place_of_the_best_of_three_by_hand():
     ours = np.arange(10.0)
     # below all of ours: of the 286 triples of 13 one
@@ -221,9 +237,16 @@ def test_the_place_of_the_best_of_three_by_hand():
     # the more they have been, the rarer so low, the likelier so high
     assert chance_of_best(ours, -1.0, 4) < chance_of_best(ours, -1.0, 3)
     assert of_best(ours, -1.0, 3)[1] == INCONSISTENT
-    assert of_best(ours, 5.5, 3)[1] == CONSISTENT
+    assert of_best(ours, 5.5, 3)[1] == NOT_CONTRADICTED
     assert of_best(ours, 99.0, 3)[1] == UNDECIDED
     assert of_best(ours[:9], -1.0, 3)[1] == TOO_FEW
+
+
+@pytest.mark.parametrize("replicates", [1, 3, 5])
+def test_from_how_many_runs_on_a_maximum_can_be_too_high(replicates):
+    enough = fewest_to_contradict(replicates)
+    assert chance_of_best(np.zeros(enough), 1.0, replicates) < 0.05
+    assert chance_of_best(np.zeros(enough - 1), 1.0, replicates) >= 0.05
 
 
 def test_the_place_of_the_best_of_three_by_simulation():

@@ -195,6 +195,28 @@ def test_records_describe_the_optimizers_stored_fitness(name):
     assert len({record.crash_rate for record in experiment.records}) > 1
 
 
+@every_experiment
+def test_a_trial_that_ends_in_no_number_counts_as_nothing(name):
+    experiment = Experiment(tiny(name), threads=1)
+    sound = experiment.engine.run
+
+    def broken(work):
+        found = sound(work)
+        found.fitness[0] = np.nan
+        return found
+
+    experiment.engine.run = broken
+    record = next(experiment.run())
+    fitness = experiment.optimizer.fitness
+    assert np.isneginf(fitness).sum() == 1
+    assert record.mean == np.maximum(fitness, 0).mean()
+    assert record.std == np.maximum(fitness, 0).std()
+    # and the run can be read, and goes on
+    resumed = Experiment(tiny(name), threads=1)
+    resumed.restore(through_a_file(experiment.state()))
+    assert_same(resumed, experiment)
+
+
 @pytest.mark.parametrize("name", ["de-best", "de-rand"])
 def test_differential_evolution_never_loses_its_best(name):
     best = [record.best for record in evolved(tiny(name, evaluations=80)).records]

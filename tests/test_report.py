@@ -34,9 +34,9 @@ from evolution.report.command import report, tables
 from evolution.report.findings import WITH_NOISE, held_out_fitness, luck
 from evolution.report.pairs import compared, pair_rows
 from evolution.report.samples import TARGET_SHARES
-from evolution.report.successes import BEATS, FOLLOWS, success_rows
+from evolution.report.successes import FOLLOWS, MATCHES, success_rows
 from evolution.report.summary import summary, summary_text
-from evolution.report.tables import csv_text, run_rows, target_rows
+from evolution.report.tables import BEST_STORED, csv_text, run_rows, target_rows
 from evolution.report.words import spread
 from evolution.statistics import rank_correlation
 from evolution.study_config import seeds_text
@@ -120,7 +120,7 @@ def test_a_run_that_says_less_has_empty_cells(tmp_path):
     for column in ("epuck worst", "epuck following", "epuck mean_low", "control_steps"):
         assert row[column] == ""
     # of a criterion that not every run can meet or fail nothing is said
-    assert {row.criterion for row in success_rows(data)} == {BEATS}
+    assert {row.criterion for row in success_rows(data)} == {MATCHES}
     json.loads(summary_text(summary(data, "out", False)))
 
 
@@ -166,7 +166,7 @@ def test_disturbed_champions_are_shown_with_their_disturbances(tmp_path):
         champion.write_text(json.dumps(fields))
     text = to_markdown(held_out_fitness(load_study(path)))
     assert "with the disturbances that they evolved with" in text
-    assert "| GA | 2 | 41.5 [41.2, 41.8] |" in text
+    assert "| GA | 2 | 41.5 (41.0, 42.0) |" in text
 
 
 def test_no_stars_below_ten_runs(study):
@@ -209,7 +209,7 @@ def test_equal_samples_are_no_error(tmp_path):
             test["mean"] = 100.0
         champion.write_text(json.dumps(fields))
     data = load_study(path)
-    rows = [row for row in pair_rows(data) if row.measure != "stored"]
+    rows = [row for row in pair_rows(data) if row.measure != BEST_STORED]
     assert {(row.p, row.p_holm, row.a12, row.u) for row in rows} == {(1, 1, 0.5, 4.5)}
     assert rank_correlation(np.full(5, 1.0), np.arange(5.0)) is None
     json.loads(summary_text(summary(data, "out", False)))
@@ -222,7 +222,7 @@ def test_successes_by_hand(study):
     for row in rows:
         robot = row["robot"]
         runs = study.runs[row["experiment"]]
-        if row["criterion"] == BEATS:
+        if row["criterion"] == MATCHES:
             met = [run.held_out(robot) >= 195 for run in runs]
         else:
             shares = [
@@ -311,10 +311,11 @@ def test_seeds(seeds, text):
     assert seeds_text(seeds) == text
 
 
-def test_spread_of_one_run_has_no_quartiles():
+def test_spread_of_few_runs_has_no_quartiles():
     assert spread(np.array([3.14])) == "3.1 (n = 1)"
     assert spread(np.array([])) == "-"
-    assert spread(np.array([1.0, 2, 3])) == "2.0 [1.5, 2.5]"
+    assert spread(np.array([3.0, 1, 2])) == "2.0 (1.0, 2.0, 3.0)"
+    assert spread(np.array([3.0, 1, 2, 5, 4])) == "3.0 [2.0, 4.0]"
 
 
 # documents
@@ -529,7 +530,7 @@ def test_luck_with_noise_is_held_against_starts_with_noise(tmp_path):
 
     # tested on ideal robots only: stored fitness is another quantity
     _, _, _, *cells = row()
-    assert cells == ["-"] * 5
+    assert cells == ["-"] * 6
     text = to_markdown(luck(data))
     assert re.search(r"\| DE/best/1/bin \| 3 \| \d[^|]*\| \d[^|]*\| -?\d", text)
     experiment = summary(data, "out", False)["experiments"]["ga"]
@@ -540,8 +541,26 @@ def test_luck_with_noise_is_held_against_starts_with_noise(tmp_path):
         run.champion.scores["held_out_as_evolved"] = {"epuck_planar": test}
     _, _, _, held_out, found, *believed = row()
     assert held_out[0].isdigit()
-    assert found == "7.0 [7.0, 7.0]"
-    assert believed == ["-"] * 3
+    assert found == "7.0 (7.0, 7.0, 7.0)"
+    assert believed == ["-"] * 4
+
+
+def test_experiments_of_other_budgets_are_not_compared(tmp_path):
+    path = write_study(tmp_path / "study", seeds(12))
+    config = path / "study.yaml"
+    fields = yaml.safe_load(config.read_text())
+    fields["de-rand"]["trials"] += 1
+    config.write_text(yaml.safe_dump(fields, sort_keys=False))
+    for place in path.glob("de-rand/*/config.yaml"):
+        own = yaml.safe_load(place.read_text())
+        place.write_text(yaml.safe_dump(own | {"trials": own["trials"] + 1}))
+    data = load_study(path)
+    assert (
+        "comparisons with de-best: evaluations times trials of de-rand are others"
+    ) in data.missing
+    assert {(row.a, row.b) for row in pair_rows(data)} == {("de-best", "ga")}
+    # a champion's fitness on fresh starts is still held against the follower's
+    assert data.yardstick
 
 
 def test_experiments_of_other_settings_are_not_compared(tmp_path):

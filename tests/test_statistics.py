@@ -267,7 +267,7 @@ def test_a_constant_sample_has_a_mean_without_doubt():
     assert mean_interval(np.full(5, 3.0), rng()) == Interval(3, 3, 3)
 
 
-@given(st.lists(st.integers(0, 3), min_size=2, max_size=6).map(np.array))
+@given(st.lists(st.integers(0, 3), min_size=5, max_size=9).map(np.array))
 def test_small_samples_with_ties_have_bounds(sample):
     interval = mean_interval(sample, rng())
     assert sample.min() <= interval.low <= interval.value + 1e-12
@@ -337,11 +337,13 @@ def test_expected_running_time_interval():
     assert interval.value == expected_running_time(hits, spent)
     assert 300 < interval.low < interval.value < interval.high < 1500
     assert interval == expected_running_time_interval(hits, spent, rng())
-    # a quarter squared of the resamples of two hits in four have none
-    few = expected_running_time_interval(HITS, SPENT, rng())
-    assert few.low < 1200
+    # a third of the resamples of one hit in five have none
+    once = np.array([100, math.nan, math.nan, math.nan, math.nan])
+    few = expected_running_time_interval(once, np.full(5, 1000), rng())
+    assert few.value == 4100
+    assert few.low < 4100
     assert few.high == math.inf
-    none = expected_running_time_interval(HITS[1::2], SPENT[1::2], rng())
+    none = expected_running_time_interval(np.full(5, math.nan), np.full(5, 9), rng())
     assert none == Interval(math.inf, math.inf, math.inf)
 
 
@@ -410,14 +412,17 @@ def test_bad_arguments_are_refused(call):
         call()
 
 
-def test_one_run_has_a_value_and_no_bounds():
-    one = np.array([3.0])
+@pytest.mark.parametrize("n", [1, 2, 4, 5])
+def test_few_runs_have_a_value_and_no_bounds(n):
+    few = np.linspace(2, 4, n) if n > 1 else np.array([3.0])
     for interval in (
-        mean_interval(one, rng()),
-        median_difference(one, np.zeros(5), rng()),
-        expected_running_time_interval(one, np.array([9.0]), rng()),
+        mean_interval(few, rng()),
+        median_difference(few, np.zeros(5), rng()),
+        expected_running_time_interval(few, np.full(n, 9.0), rng()),
     ):
         assert interval.value == 3
-        assert math.isnan(interval.low)
-        assert math.isnan(interval.high)
-    assert mann_whitney(one, GOOD + 0.5).p == 1
+        assert math.isnan(interval.low) == math.isnan(interval.high) == (n < 5)
+
+
+def test_one_run_differs_from_nothing():
+    assert mann_whitney(np.array([3.0]), GOOD + 0.5).p == 1

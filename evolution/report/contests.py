@@ -6,7 +6,7 @@ from evolution.comparisons import FEWEST_FOR_STARS, LEVELS
 from evolution.report.blocks import Block, Heading, Listing, Paragraph, Table
 from evolution.report.pairs import PairRow, compared, pair_rows
 from evolution.report.samples import FOLLOWING
-from evolution.report.successes import BEATS, FOLLOWS, SuccessRow, success_rows
+from evolution.report.successes import FOLLOWS, MATCHES, SuccessRow, success_rows
 from evolution.report.tables import (
     TargetRow,
     held_out_measure,
@@ -60,7 +60,7 @@ def _measure_title(measure: str, data: StudyData) -> str:
         held_out_measure(robot): f"Held-out fitness, {robot_name(robot)}"
         for robot in data.robots
     }
-    return titles.get(measure, "Stored fitness, what evolution believes")
+    return titles.get(measure, "Best stored fitness, what the paper reports")
 
 
 def _pair_table(rows: Sequence[PairRow]) -> Table:
@@ -91,7 +91,7 @@ def successes(data: StudyData) -> list[Block]:
     rows = success_rows(data)
     blocks: list[Block] = [Heading("Success")]
     meanings = {
-        BEATS: f"held-out mean of at least the {YARDSTICK_LABEL}'s on the same "
+        MATCHES: f"held-out mean of at least the {YARDSTICK_LABEL}'s on the same "
         "starts; it keeps 8 mm off the wall, and closer earns more",
         FOLLOWS: f"at least {FOLLOWING:.0%} of the test trials are a wall follower's "
         "or a hugger's",
@@ -101,7 +101,7 @@ def successes(data: StudyData) -> list[Block]:
         if not found:
             absent = (
                 "the hand-written wall follower was not tested in the setting of all"
-                if criterion == BEATS
+                if criterion == MATCHES
                 else "not every run has behaviour classes"
             )
             blocks.append(Paragraph(f"A run {criterion}: not known, {absent}."))

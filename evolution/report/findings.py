@@ -21,6 +21,7 @@ from evolution.report.samples import (
 from evolution.report.tables import shown_robots
 from evolution.report.words import (
     NOTHING,
+    SPREAD,
     YARDSTICK_LABEL,
     label,
     percent,
@@ -41,7 +42,7 @@ def held_out_fitness(data: StudyData) -> list[Block]:
             sample = data.held_out(name, robot)
             crashes = known(tests_of(data, name, robot), "crash_rate")
             row += [spread(sample), f"{sample.max():.1f}", _percent_median(crashes)]
-        rows.append([*row, spread(data.stored(name))])
+        rows.append([*row, spread(data.best_stored(name))])
     if data.yardstick:
         row = [YARDSTICK_LABEL, NOTHING]
         for robot in robots:
@@ -56,12 +57,13 @@ def held_out_fitness(data: StudyData) -> list[Block]:
     return [
         Heading("Held-out fitness"),
         Paragraph(
-            "Median [quartiles] over runs of the champion's mean on the test starts, "
-            "the best run, and the median share of its trials that crash. Stored "
-            "fitness is last, since it is what the algorithm believes: a mean of few "
-            "trials that it chose for being high."
+            f"{SPREAD} of the champion's mean on the test starts, the best run, and "
+            "the median share of its trials that crash. Best stored is last: the "
+            "highest fitness that a run believed in, a mean of few trials that was "
+            "chosen for being high. It is what the paper reports, and seldom the "
+            "champion's."
         ),
-        Table([*columns, "stored"], rows),
+        Table([*columns, "best stored"], rows),
         *_as_evolved(data),
     ]
 
@@ -140,6 +142,8 @@ def luck(data: StudyData) -> list[Block]:
         stored, held_out = data.stored(name), like_for_like(data, name)
         tested = np.isfinite(held_out)
         believed, worth = most_believed(data, name)
+        # by run, where every run says both
+        both = held_out[tested].size == worth.size
         rows.append(
             (
                 label(name),
@@ -150,6 +154,7 @@ def luck(data: StudyData) -> list[Block]:
                 spread(believed),
                 spread(worth),
                 spread(believed - worth),
+                spread(held_out[tested] - worth) if both else NOTHING,
             )
         )
     return [
@@ -158,7 +163,8 @@ def luck(data: StudyData) -> list[Block]:
             f"On the {robot_name(robot)}, which it evolved on: stored against held-out "
             "fitness of the champion, then of the individual that the run believed "
             "most in. The difference is luck: of many noisy evaluations the highest is "
-            "believed." + (f" {WITH_NOISE}" if noisy else "")
+            "believed. Regained: how much more the champion, chosen on validation "
+            "starts, is worth by run." + (f" {WITH_NOISE}" if noisy else "")
         ),
         Table(
             (
@@ -170,6 +176,7 @@ def luck(data: StudyData) -> list[Block]:
                 "most believed, stored",
                 "held-out",
                 "luck",
+                "regained",
             ),
             rows,
         ),
@@ -221,10 +228,10 @@ def behaviour(data: StudyData) -> list[Block]:
         Heading("Behaviour"),
         Paragraph(
             "Share of the test trials in each class, mean over runs; mean clearance "
-            "from shell to wall in mm, median [quartiles] over runs; champions whose "
-            f"mean clearance is below {HUG * 1000:.0f} mm. A champion that rides so "
-            "close is a reality gap in waiting: a real robot's sensors and wheels err "
-            "by more. A trial has the first class that fits:"
+            "from shell to wall in mm while a wall is near, median [quartiles] over "
+            f"runs; champions whose mean clearance is below {HUG * 1000:.0f} mm. A "
+            "champion that rides so close is a reality gap in waiting: a real robot's "
+            "sensors and wheels err by more. A trial has the first class that fits:"
         ),
         Listing([f"{name}: {MEANINGS[name]}" for name in MEANINGS if name in seen]),
         Paragraph(

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from evolution.champion import BEST_OF_POPULATION, LATEST_BEST, N_VALIDATION
 from evolution.report.blocks import Block, Code, Heading, Listing, Paragraph, Table
 from evolution.report.samples import tests_of
 from evolution.report.summary import commands, config_differences
@@ -92,7 +93,11 @@ def what_was_run(data: StudyData) -> list[Block]:
             "Budget and spent are individual evaluations, each of that many trials; a "
             "run spends whole generations only. Control steps of a run are in "
             f"millions, median [quartiles]; {data.steps} a trial at most, fewer for "
-            "robots that crash, and where racing breaks off who can only lose."
+            "robots that crash, and where racing breaks off who can only lose. "
+            "Choosing the champion comes on top, for every algorithm: "
+            f"{N_VALIDATION} trials of each candidate, which are the best "
+            f"{BEST_OF_POPULATION:.0%} of the last population and the last "
+            f"{LATEST_BEST} that raised the run's best, some of them the same."
         ),
     ]
     return blocks

@@ -31,7 +31,7 @@ class PairRow:
     """Two experiments in one measure.
 
     Attributes:
-        measure: "stored", or "held-out" and the robot.
+        measure: "best stored", or "held-out" and the robot.
         a: name of the first experiment.
         b: name of the second.
         n_a: runs of the first.

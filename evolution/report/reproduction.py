@@ -14,6 +14,7 @@ from evolution.report.blocks import (
 )
 from evolution.report.claims import (
     PAPER,
+    REPLICATES,
     Claim,
     claims,
     held_out_order,
@@ -23,7 +24,8 @@ from evolution.report.claims import (
 from evolution.report.first_generation import FirstGeneration
 from evolution.report.samples import kept, most_believed
 from evolution.report.tables import shown_robots
-from evolution.report.words import label, median_and_quartiles, spread
+from evolution.report.verdicts import fewest_to_contradict
+from evolution.report.words import SPREAD, label, median_and_quartiles, spread
 from evolution.study_config import StudyConfig, find_study
 from evolution.study_data import StudyData
 
@@ -40,7 +42,7 @@ DIFFERENCES = (
     (
         "sensors",
         "0 near to 1 free, 4 cm",
-        "the same, linear along eight rays at the data sheet's angles, without noise",
+        "the same, linear along eight rays at the angles Player has, without noise",
     ),
     (
         "crash",
@@ -115,7 +117,10 @@ def reproduction(
             "a statement about runs by Wilson's 95 % bounds on one side of one half. "
             "A maximum of the paper, taken for the best of three runs, is inconsistent "
             "if the best of three of our own would have so extreme a rank among ours "
-            "with p < 0.05, two-sided; above all of ours it stays undecided."
+            "with p < 0.05, two-sided. Else nothing contradicts it, which is weaker "
+            "than what other claims have to show: a maximum above all of ours stays "
+            f"undecided, and below {fewest_to_contradict(REPLICATES)} runs no maximum "
+            "is too high."
         ),
         Heading("What there is"),
         *_there(study),
@@ -158,7 +163,7 @@ def reproduction(
 
 
 def runs_table(study: StudyData) -> Table:
-    """Held-out fitness first, then stored, of every experiment with runs."""
+    """Held-out fitness first, then best stored, of every experiment with runs."""
     robots = shown_robots(study)
     columns = ["algorithm", "n", "evaluations"]
     columns += [f"held-out, {robot}" for robot in robots]
@@ -168,7 +173,7 @@ def runs_table(study: StudyData) -> Table:
             str(len(runs)),
             f"{study.configs[name].evaluations:,}",
             *(spread(study.held_out(name, robot)) for robot in robots),
-            spread(study.stored(name)),
+            spread(study.best_stored(name)),
         ]
         for name, runs in study.runs.items()
         if runs
@@ -176,13 +181,16 @@ def runs_table(study: StudyData) -> Table:
     if study.yardstick:
         means = [f"{study.yardstick[robot]['mean']:.1f}" for robot in robots]
         rows.append([f"{YARDSTICK}, written by hand", "", "", *means, ""])
-    return Table([*columns, "stored"], rows)
+    return Table([*columns, "best stored"], rows)
 
 
 def _there(study: StudyData) -> list[Block]:
     blocks: list[Block] = [
         runs_table(study),
-        Paragraph("Medians with quartiles in brackets."),
+        Paragraph(
+            f"{SPREAD}. Held-out: the champion's mean on fresh starts; best stored: "
+            "the highest fitness that a run believed in."
+        ),
     ]
     if study.missing:
         blocks += [Paragraph("Missing:"), Listing(study.missing)]
@@ -215,8 +223,7 @@ def _hidden(study: StudyData) -> list[Block]:
         Paragraph(
             "The individual with the highest stored fitness of each run, which is what "
             f"the paper reports, and what 1,000 fresh starts on {robot} say of it; "
-            "then the champion, chosen on validation starts. Medians with quartiles "
-            "in brackets."
+            f"then the champion, chosen on validation starts. {SPREAD}."
         ),
         Table(
             [
@@ -248,8 +255,9 @@ def _rungs(study: StudyData) -> list[Block]:
             [
                 f"{label(name)}: {median_and_quartiles(100 * share, ' %')} of the "
                 f"held-out fitness on {first} is kept on {last}, "
-                f"n = {len(study.runs[name])}."
+                f"n = {share.size}."
                 for name, share in shares.items()
+                if share.size
             ]
         )
     ]

@@ -17,7 +17,7 @@ from evolution.report.tables import shown_robots
 from evolution.statistics import wilson
 from evolution.study_data import RunData, StudyData
 
-BEATS, FOLLOWS = "beats the hand-written follower", "follows walls"
+MATCHES, FOLLOWS = "matches the hand-written follower", "follows walls"
 """Criteria of success.
 
 The first asks for the yardstick's mean on the same starts: of one follower, which
@@ -32,7 +32,7 @@ class SuccessRow:
     """Runs of an experiment that meet a criterion, alone or against another's.
 
     Attributes:
-        criterion: `BEATS` or `FOLLOWS`.
+        criterion: `MATCHES` or `FOLLOWS`.
         robot: on which.
         experiment: its name.
         successes: runs that meet it.
@@ -76,7 +76,7 @@ class SuccessRow:
 def success_rows(data: StudyData) -> list[SuccessRow]:
     """For each criterion and robot, a row per experiment, then one per pair.
 
-    Without a yardstick there is no `BEATS`, without behaviour classes no `FOLLOWS`.
+    Without a yardstick there is no `MATCHES`, without behaviour classes no `FOLLOWS`.
     """
     rows = []
     for robot in shown_robots(data):
@@ -87,14 +87,14 @@ def success_rows(data: StudyData) -> list[SuccessRow]:
             }
             rows += _successes(criterion, robot, outcomes, data.alike)
     # all of a criterion together
-    return sorted(rows, key=lambda row: (BEATS, FOLLOWS).index(row.criterion))
+    return sorted(rows, key=lambda row: (MATCHES, FOLLOWS).index(row.criterion))
 
 
 def _criteria(data: StudyData, robot: str) -> dict[str, Callable[[RunData], bool]]:
     """What the data can tell of each run on a robot."""
     reference, found = data.yardstick_mean(robot), {}
     if reference is not None:
-        found[BEATS] = lambda run: run.held_out(robot) >= reference
+        found[MATCHES] = lambda run: run.held_out(robot) >= reference
     everything = [run for runs in data.runs.values() for run in runs]
     if all(_test_of(run, robot).get("behaviour") for run in everything):
         found[FOLLOWS] = lambda run: following_share(_test_of(run, robot)) >= FOLLOWING

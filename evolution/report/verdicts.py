@@ -6,7 +6,7 @@ every run a Wilson interval on one side of one half; the best of a few runs of s
 else has to have a rank among ours that is not too extreme.
 """
 
-from math import comb
+from math import comb, floor
 
 import numpy as np
 
@@ -16,7 +16,9 @@ from evolution.report.words import probability
 from evolution.statistics import wilson
 
 CONSISTENT, INCONSISTENT = "consistent", "inconsistent"
+NOT_CONTRADICTED = "consistent, in that nothing contradicts it"
 UNDECIDED = "can't be tested: undecided by these runs"
+HANGS_ON_READING = "can't be tested: hangs on the reading"
 TOO_FEW = f"can't be tested: fewer than {FEWEST_FOR_STARS} runs"
 NOT_MEASURED = "can't be tested: not measured"
 OTHER_STUDY = "can't be tested: another study"
@@ -45,8 +47,8 @@ def of_most(holds: np.ndarray) -> tuple[str, str]:
 def of_best(sample: np.ndarray, best: float, replicates: int) -> tuple[str, str]:
     """Whether the best of so many runs of somebody else may be one of such as ours.
 
-    Above all of ours it may be luck for long: of three more runs the best is so with
-    a probability of 3 / (n + 3).
+    That it may is all that runs can say. Above all of ours it may be luck for long: of
+    three more runs the best is so with a probability of 3 / (n + 3).
 
     Args:
         sample: of our runs, `(n,)`.
@@ -63,7 +65,7 @@ def of_best(sample: np.ndarray, best: float, replicates: int) -> tuple[str, str]
         return ours, TOO_FEW
     if p < LEVELS[0]:
         return ours, INCONSISTENT
-    return ours, CONSISTENT if above else UNDECIDED
+    return ours, NOT_CONTRADICTED if above else UNDECIDED
 
 
 def chance_of_best(sample: np.ndarray, best: float, replicates: int) -> float:
@@ -79,3 +81,9 @@ def chance_of_best(sample: np.ndarray, best: float, replicates: int) -> float:
 
     at_most = 1 - at_least(above + 1) if above < n else 1.0
     return min(1.0, 2 * min(at_least(above), at_most))
+
+
+def fewest_to_contradict(replicates: int) -> int:
+    """Runs of ours below which no maximum, however high, is too extreme."""
+    # 2 replicates / (n + replicates) below the level
+    return floor(2 * replicates / LEVELS[0] - replicates) + 1

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from evolution.statistics import quartiles
+from evolution.statistics import FEWEST_FOR_INTERVAL, quartiles
 
 LABELS: MappingProxyType[str, str] = MappingProxyType(
     {
@@ -43,14 +43,24 @@ def robot_name(robot: str) -> str:
     return ROBOTS.get(robot, robot)
 
 
+SPREAD = f"Median [quartiles] over runs (below {FEWEST_FOR_INTERVAL}: every run)"
+"""What `spread` writes."""
+
+
 def spread(sample: np.ndarray, scale: float = 1.0, form: str = "z.1f") -> str:
-    """Median and quartiles of `(n,)`; the value alone of one run."""
+    """Median and quartiles of `(n,)`; of few values, which have none, all of them."""
     if not sample.size:
         return NOTHING
     if sample.size == 1:
         return f"{sample[0] * scale:{form}} (n = 1)"
     found = quartiles(sample * scale)
+    if sample.size < FEWEST_FOR_INTERVAL:
+        return f"{found.median:{form}} ({_listed(sample * scale, form)})"
     return f"{found.median:{form}} [{found.lower:{form}}, {found.upper:{form}}]"
+
+
+def _listed(sample: np.ndarray, form: str) -> str:
+    return ", ".join(f"{value:{form}}" for value in np.sort(sample))
 
 
 def median_and_quartiles(sample: np.ndarray, unit: str = "") -> str:
@@ -59,6 +69,8 @@ def median_and_quartiles(sample: np.ndarray, unit: str = "") -> str:
     text = f"median {found.median:.1f}{unit}"
     if sample.size == 1:
         return text
+    if sample.size < FEWEST_FOR_INTERVAL:
+        return f"{text} ({_listed(sample, '.1f')})"
     return f"{text} (quartiles {found.lower:.1f} and {found.upper:.1f})"
 
 
