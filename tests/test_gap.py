@@ -229,7 +229,7 @@ def test_the_document_says_who_kept_what():
     assert "| a | a/seed-1 | 0.500 |" in text
     assert "50% [15%, 85%]" in text
     # kept 70.5 % and 81.25 %, mastered 50 % and 25 %
-    assert "| a | epuck | 2 | 0.450 | 76% | 0.2 | 38% | 38% |" in text
+    assert "| a | 0.1 m/s | epuck | 2 | 0.450 | 76% | 0.2 | 38% | 38% |" in text
     # of three policies, ranks say nothing
     assert "Ranks" not in text
     members = [0, 1, 2, 0, 1]

@@ -108,5 +108,5 @@ def test_the_gap_s_documents_say_what_was_measured(monkeypatch):
     latency = np.array([world["latency"] for world in record["worlds"]])
     blocks = document(names, transfers, groups, of_one_speed, record["starts"], latency)
     assert (RESULTS / "gap" / "gap.md").read_text() == to_markdown(blocks)
-    table = to_markdown([summary(transfers, groups)])
+    table = to_markdown([summary(transfers, groups, of_one_speed)])
     assert (RESULTS / "gap" / "summary.md").read_text() == table

@@ -138,11 +138,10 @@ def _write(
         write_text(folder / "gap.csv", _rows(policies, places, transfers))
         names = [policy.name for policy in policies]
         latency = np.array([place.latency for place in places])
-        blocks = document(
-            names, transfers, groups, peers(policies), options.starts, latency
-        )
+        alike = peers(policies)
+        blocks = document(names, transfers, groups, alike, options.starts, latency)
         write_text(folder / "gap.md", to_markdown(blocks))
-        table = to_markdown([summary(transfers, groups)])
+        table = to_markdown([summary(transfers, groups, alike)])
         write_text(folder / "summary.md", table)
     save(kept_figure(transfers, groups), folder, "gap")
 

@@ -28,6 +28,7 @@ COLUMNS = (
 
 GROUP_COLUMNS = (
     "experiment",
+    "full speed",
     "robot",
     "n",
     "fitness at home",
@@ -39,16 +40,20 @@ GROUP_COLUMNS = (
 
 
 def summary(
-    transfers: Mapping[str, Transfer], groups: Mapping[str, Sequence[int]]
+    transfers: Mapping[str, Transfer],
+    groups: Mapping[str, Sequence[int]],
+    peers: Mapping[str, Sequence[int]],
 ) -> Table:
     """A row per experiment and robot: medians over its policies of their means.
 
     Args:
         transfers: by robot.
         groups: indices of the policies of each experiment.
+        peers: of each speed.
     """
     rows = []
     for group, members in groups.items():
+        speed = ", ".join(s for s, each in peers.items() if set(each) & set(members))
         for robot, transfer in transfers.items():
             share, collisions, mastered, against_home = (
                 float(np.median(values[:, members].mean(axis=0)))
@@ -62,12 +67,12 @@ def summary(
             home = float(np.median(transfer.home[members]))
             rows.append(
                 [
-                    *(group, robot, str(len(members)), f"{home:.3f}"),
+                    *(group, speed, robot, str(len(members)), f"{home:.3f}"),
                     *(f"{share:.0%}", f"{collisions:.1f}"),
                     *(f"{mastered:.0%}", f"{against_home:.0%}"),
                 ]
             )
-    return Table(GROUP_COLUMNS, rows, texts=2)
+    return Table(GROUP_COLUMNS, rows, texts=3)
 
 
 def by_latency(
@@ -124,10 +129,14 @@ def document(
             "home, or of an ideal robot's in that world's arena if that is more: "
             "walls are found sooner in a smaller arena. Against home: mastered if "
             "the fitness at home is all that counts. In brackets, 95 % intervals over "
-            "the worlds."
+            "the worlds; they leave out the starts, which are the same in every world."
         ),
-        summary(transfers, groups),
-        Paragraph("Medians over the policies of an experiment, of their means."),
+        summary(transfers, groups, peers),
+        Paragraph(
+            "Medians over the policies of an experiment, of their means. Randomised "
+            "robots of evolution and worlds share the ranges of wheel radius, track, "
+            "mass, friction and latency: whoever evolved on such is at home there."
+        ),
         Heading("Latency"),
         Paragraph(
             "Kept in the worlds where commands reach the wheels so many control steps "
