@@ -19,7 +19,7 @@ from tyro.constructors import PrimitiveConstructorSpec
 
 from epuck_mj.calibration import Calibration
 from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
-from epuck_mj.control import TaskParameters
+from epuck_mj.control import STEPS_MAX, TaskParameters
 from epuck_mj.controller import Network
 from epuck_mj.errors import UserError
 from epuck_mj.mappings import parse_yaml, to_yaml
@@ -109,7 +109,9 @@ class ExperimentConfig(BaseModel):
     )
     arena: str = Field("arena", description="name of a shipped arena or an MJCF file")
     trials: StrictInt = Field(5, ge=1, description="trials of an individual")
-    steps: StrictInt = Field(300, ge=1, description="control steps of a trial")
+    steps: StrictInt = Field(
+        300, ge=1, le=STEPS_MAX, description="control steps of a trial"
+    )
     control_step: StrictFloat = Field(0.1, gt=0, description="control step [s]")
     fitness: Literal["product", "literal"] = Field(
         "product", description="step fitness: the paper's prose or its equation (2)"

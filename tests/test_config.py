@@ -277,6 +277,7 @@ def test_a_key_of_the_other_optimizer_is_unknown(config_file):
         ("arena", ["arena"]),
         ("trials", 0),
         ("steps", "300 or so"),
+        ("steps", 10_000_001),
         ("control_step", 0),
         ("control_step", float("nan")),
         ("fitness", "sum"),
