@@ -1,5 +1,6 @@
 """Files: found, read, and written in full or not at all."""
 
+import errno
 import io
 import os
 import secrets
@@ -16,12 +17,20 @@ from epuck_mj.errors import UserError
 TEMPORARY = ".tmp"
 """End of the names of files that are being written."""
 
+NO_FILE = "it is a pipe or a device, no file"
+
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Replace `path` by `content`; whoever reads sees the old file or the new."""
+    """Replace `path` by `content`; whoever reads sees the old file or the new.
+
+    A link stays one, and what it names is replaced; pipes and devices are refused.
+    """
+    asked, path = path, path.resolve() if path.is_symlink() else path
     # named before it is there: whenever a signal comes, it is known what to remove
     temporary = _temporary(path)
     try:
+        if _is_special(path):
+            raise OSError(errno.EINVAL, NO_FILE)
         try:
             with temporary.open("xb") as file:
                 file.write(content)
@@ -33,8 +42,13 @@ def write_bytes(path: Path, content: bytes) -> None:
             raise
     except OSError as error:
         # of the temporary one nobody has heard
-        error.filename, error.filename2 = str(path), None
+        error.filename, error.filename2 = str(asked), None
         raise
+
+
+def _is_special(path: Path) -> bool:
+    """Whether something is there that is neither a file nor a folder."""
+    return path.exists() and not path.is_file() and not path.is_dir()
 
 
 def write_text(path: Path, content: str) -> None:
@@ -109,6 +123,8 @@ def check_writable(path: Path) -> None:
     """
     if is_directory(path):
         raise UserError(f"cannot write '{path}': it is a folder")
+    if _is_special(path):
+        raise UserError(f"cannot write '{path}': {NO_FILE}")
     if not is_directory(path.parent):
         raise UserError(f"cannot write '{path}': no folder '{path.parent}'")
     probe = _temporary(path)

@@ -1,5 +1,6 @@
 """Files: found, read, and written in full or not at all."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -82,3 +83,24 @@ def test_what_cannot_be_read_is_one_line(name, tmp_path):
         files.read_text(tmp_path / name)
     assert "\n" not in str(error.value)
     assert "None" not in str(error.value)
+
+
+def test_pipes_and_devices_are_refused_and_stay(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(UserError, match="pipe': it is a pipe or a device, no file"):
+        files.check_writable(pipe)
+    with pytest.raises(OSError, match="no file") as error:
+        files.write_text(pipe, "new")
+    assert error.value.filename == str(pipe)
+    assert pipe.is_fifo()
+    assert [each.name for each in tmp_path.iterdir()] == ["pipe"]
+
+
+def test_what_a_link_names_is_replaced_and_the_link_stays(tmp_path):
+    target, link = tmp_path / "target", tmp_path / "link"
+    target.write_text("old")
+    link.symlink_to(target)
+    files.write_text(link, "new")
+    assert link.is_symlink()
+    assert target.read_text() == "new"

@@ -72,7 +72,7 @@ def abroad(
         outcomes = []
         for policy in policies:
             duration = policy.task.steps * policy.task.control_step
-            steps = round(duration / period)
+            steps = max(1, round(duration / period))
             task = replace(policy.task, steps=steps, control_step=period)
             starts = starts_for_test(free(scene, policy.start_clearance), n)
             tracks = record_tracks(
