@@ -43,7 +43,8 @@ bridge: $(INSTALLED)
 # champions of three seeds of each experiment in pseudo-realities, on both robots
 gap: $(INSTALLED)
 	$(BIN)/python -m evolution.gap \
-	  $(wildcard $(PAPERS:%=results/paper/%/seed-[123])) results/transfer wall-follower --output results/gap
+	  $(wildcard $(PAPERS:%=results/paper/%/seed-[123])) \
+	  results/transfer wall-follower --output results/gap
 
 # what git keeps of the studies in runs/, and everything that is made of it
 results: $(INSTALLED)
