@@ -18,20 +18,20 @@ from pathlib import Path
 import numpy as np
 import tyro
 
-from epuck_mj.bridge.builds import BUILDS
-from epuck_mj.bridge.fake.body import Journal
+from epuck_mj.bridge.drive.robot import RealRobot
+from epuck_mj.bridge.drive.session import Session
+from epuck_mj.bridge.fake.builds import BUILDS
+from epuck_mj.bridge.fake.mujoco_body import Journal
 from epuck_mj.bridge.fake.reference import deviation, nominal, same_times
-from epuck_mj.bridge.link import Link
-from epuck_mj.bridge.robot import RealRobot
-from epuck_mj.bridge.serial_line import SerialLine
-from epuck_mj.bridge.serial_port import SerialPort
-from epuck_mj.bridge.session import Session
-from epuck_mj.calibration import Calibration
-from epuck_mj.control import Policy, TaskParameters
-from epuck_mj.controller_file import load
-from epuck_mj.files import read_arrays
-from epuck_mj.model import Scene, load_scene
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.bridge.line.link import Link
+from epuck_mj.bridge.line.serial_line import SerialLine
+from epuck_mj.bridge.line.serial_port import SerialPort
+from epuck_mj.host.files import read_arrays
+from epuck_mj.policies.file import load
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.control import Policy, TaskParameters
 
 ROBOTS = ("epuck", "epuck_planar")
 FIRMWARE = "asercom"

@@ -18,12 +18,12 @@ import mujoco
 import numpy as np
 import tyro
 
-from epuck_mj.control import BatchPolicy, TaskParameters, run_trials
-from epuck_mj.controller_file import load
-from epuck_mj.model import Scene, load_scene
-from epuck_mj.simulation import SimulatedRobots
-from epuck_mj.starts import START_CLEARANCE, FreeSpace
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.policies.file import load
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.starts import START_CLEARANCE, FreeSpace
+from epuck_mj.step.control import BatchPolicy, TaskParameters, run_trials
 
 HERE = Path(__file__).resolve().parent
 CHAMPIONS = HERE.parent / "results" / "paper" / "de-best"

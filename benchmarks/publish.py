@@ -9,15 +9,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from epuck_mj import files
-from epuck_mj.command_line import main, parse
 from epuck_mj.errors import UserError
-from evolution.report.blocks import to_markdown
-from evolution.report.reproduction import runs_table
-from evolution.reproduce import reproduce
-from evolution.run_directory import RunDirectory
-from evolution.study_data import load_study
-from evolution.study_directory import StudyDirectory
+from epuck_mj.host import files
+from epuck_mj.host.command_line import main, parse
+from evolution.pages.blocks import to_markdown
+from evolution.reproduce.__main__ import reproduce
+from evolution.reproduce.document import runs_table
+from evolution.run.directory import RunDirectory
+from evolution.study.data import load_study
+from evolution.study.directory import StudyDirectory
 
 REPORTED = ("paper", "wheels")
 """Folders of runs/ and results/, and what stands between the README's markers."""

@@ -17,13 +17,13 @@ from pathlib import Path
 
 import tyro
 
-from epuck_mj import files
-from epuck_mj.command_line import main, parse
-from epuck_mj.control import Trials
-from evolution.config_files import find_config, load_config
-from evolution.evaluation import BatchEngine, Work
-from evolution.experiment import Experiment
-from evolution.study_config import parse_seeds
+from epuck_mj.host import files
+from epuck_mj.host.command_line import main, parse
+from epuck_mj.step.control import Trials
+from evolution.judging.evaluation import BatchEngine, Work
+from evolution.run.generation_loop import Experiment
+from evolution.settings.config_files import find_config, load_config
+from evolution.study.config import parse_seeds
 
 EVERY = 10
 """Of so many generations one is lived both ways."""

@@ -14,14 +14,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from epuck_mj.command_line import main, parse
-from epuck_mj.files import write_text
-from epuck_mj.model import load_scene
-from epuck_mj.recording import Trial, save_recording
-from epuck_mj.starts import FreeSpace
-from epuck_mj.trajectory import record
-from evolution.champion import starts_for_test
-from evolution.held_out import WHEELED_ROBOT
+from epuck_mj.host.command_line import main, parse
+from epuck_mj.host.files import write_text
+from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.show.recording import Trial, save_recording
+from epuck_mj.trials.trajectory import record
+from evolution.judging.held_out import WHEELED_ROBOT
+from evolution.judging.starts import starts_for_test
 from evolution.named_policies import named_policies
 
 RUN = "results/paper/de-best/seed-1"

@@ -15,15 +15,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from epuck_mj import files
-from epuck_mj.command_line import main, parse
-from evolution.config_files import find_config, load_config
-from evolution.evaluation import BatchEngine
-from evolution.execution import Means
-from evolution.held_out import Judge
-from evolution.jobs import Job, carry_out, carry_out_side_by_side
+from epuck_mj.host import files
+from epuck_mj.host.command_line import main, parse
+from evolution.judging.evaluation import BatchEngine
+from evolution.judging.held_out import Judge
+from evolution.run.execution import Means
+from evolution.settings.config_files import find_config, load_config
+from evolution.study.jobs import Job, carry_out, carry_out_side_by_side
 
-IMPORTS = "import evolution.jobs"
+IMPORTS = "import evolution.study.jobs"
 
 
 @dataclass(frozen=True)

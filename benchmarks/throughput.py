@@ -23,12 +23,12 @@ import numpy as np
 import tyro
 from dm_control.rl import control
 
-from epuck_mj.control import TaskParameters
-from epuck_mj.controller import Controller, Network
-from epuck_mj.model import Scene, load_scene
-from epuck_mj.starts import FreeSpace
-from epuck_mj.tasks import FollowWalls, environment
-from evolution.evaluation import BatchEngine, Work
+from epuck_mj.environments.dm_control import FollowWalls, environment
+from epuck_mj.policies.network import Controller, Network
+from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.control import TaskParameters
+from evolution.judging.evaluation import BatchEngine, Work
 
 ROBOTS = ("epuck", "epuck_planar")
 N_ROBOTS = 750

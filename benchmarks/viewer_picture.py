@@ -17,9 +17,9 @@ from typing import TypeVar
 import tyro
 from rerun.experimental import ViewerClient
 
-from epuck_mj.command_line import main, parse
 from epuck_mj.errors import UserError
-from epuck_mj.files import write_bytes, writing
+from epuck_mj.host.command_line import main, parse
+from epuck_mj.host.files import write_bytes, writing
 from evolution.replay.viewer import viewer_binary
 from evolution.replay.web import free_ports
 

@@ -5,7 +5,7 @@ import os
 # Nothing here draws: without this, a machine without a display prints GLFW warnings.
 os.environ.setdefault("MUJOCO_GL", "disabled")
 
+from epuck_mj.environments.dm_control import SUITE, load
 from epuck_mj.errors import UserError
-from epuck_mj.tasks import SUITE, load
 
 __all__ = ["SUITE", "UserError", "load"]

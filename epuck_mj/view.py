@@ -2,7 +2,7 @@
 
 It drives at real time, trial after trial on new starts, until the window is closed. A
 crash ends a trial. What the window shows is the trial itself, step by step: the same
-start gives the trajectory of `epuck_mj.trajectory.record`, to the last bit.
+start gives the trajectory of `epuck_mj.trials.trajectory.record`, to the last bit.
 """
 
 import importlib
@@ -11,7 +11,7 @@ import re
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,14 +21,14 @@ import mujoco
 import numpy as np
 import tyro
 
-from epuck_mj.command_line import main, parse
-from epuck_mj.control import Policy, TaskParameters, drive
-from epuck_mj.controller_file import load
 from epuck_mj.errors import UserError
-from epuck_mj.model import Scene, load_scene
-from epuck_mj.sensors import Reading
-from epuck_mj.starts import START_CLEARANCE, FreeSpace
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.host.command_line import main, parse
+from epuck_mj.policies.file import load
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.rungs.single import WatchedRobot
+from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.starts import START_CLEARANCE, FreeSpace
+from epuck_mj.step.control import Policy, TaskParameters, drive
 
 LATE_MAX = 0.2
 """How late the picture may be before time that was lost is given up [s]."""
@@ -53,51 +53,6 @@ class Options:
     """duration of a trial [s]; the controller's own by default"""
     seed: int = 0
     """of the random starts"""
-
-
-class WatchedRobot:
-    """One robot in an `MjData` that others can look at after every physics step.
-
-    It starts and moves as `epuck_mj.simulation.SimulatedRobots` does.
-
-    Attributes:
-        scene: robot and arena.
-        data: what others can look at.
-        moved: called when the robot was reset and after every physics step.
-    """
-
-    def __init__(self, scene: Scene):
-        """Allocate the robot."""
-        self.scene = scene
-        self.data = mujoco.MjData(scene.model)
-        self.moved: Callable[[], None] = lambda: None
-
-    def reset(self, start: np.ndarray) -> Reading:
-        """Put the robot at rest on a start `(3,)`: x, y [m], yaw [rad]."""
-        model, data = self.scene.model, self.data
-        mujoco.mj_resetData(model, data)
-        data.qpos[:] = self.scene.qpos(start)
-        mujoco.mj_step1(model, data)
-        self.moved()
-        return self._reading()
-
-    def step(self, command: np.ndarray) -> Reading:
-        """Drive for one control step.
-
-        Args:
-            command: wheel speeds [rad/s], `(1, 2)`.
-        """
-        model, data = self.scene.model, self.data
-        data.ctrl[self.scene.wheels] = command[0]
-        for _ in range(self.scene.n_substeps):
-            # the second half first: positions and sensors are always those of now
-            mujoco.mj_step2(model, data)
-            mujoco.mj_step1(model, data)
-            self.moved()
-        return self._reading()
-
-    def _reading(self) -> Reading:
-        return self.scene.reading(self.data.sensordata[None].copy())
 
 
 class Clock:

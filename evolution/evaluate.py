@@ -8,19 +8,18 @@ from pathlib import Path
 
 import tyro
 
-from epuck_mj import files
-from epuck_mj.calibration import Calibration
-from epuck_mj.command_line import check_threads, main, parse
-from epuck_mj.disturbances import Disturbances
 from epuck_mj.errors import UserError
-from epuck_mj.wall_follower import YARDSTICK
-from evolution.champion import N_TEST, held_out_disturbances
-from evolution.conditions import Conditions
-from evolution.config import NoiseLevel
-from evolution.experiment import Purpose
-from evolution.held_out import HeldOut, judging, tested_on
+from epuck_mj.host import files
+from epuck_mj.host.command_line import check_threads, main, parse
+from epuck_mj.policies.wall_follower import YARDSTICK
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.disturbances import Disturbances
+from evolution.judging.held_out import HeldOut, judging, tested_on
+from evolution.judging.starts import N_TEST, held_out_disturbances
 from evolution.named_policies import named_policies
-from evolution.setting import Setting
+from evolution.settings.config import NoiseLevel
+from evolution.settings.randomness import Purpose
+from evolution.settings.setting import Conditions, Setting
 
 MODULE = "evolution.evaluate"
 STARTS_MAX = 100_000

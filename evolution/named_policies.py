@@ -11,15 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
-from epuck_mj import controller_file, files
-from epuck_mj.control import Policy, TaskParameters
 from epuck_mj.errors import UserError
-from epuck_mj.starts import START_CLEARANCE
-from epuck_mj.wall_follower import YARDSTICK, WallFollower
-from evolution.config import ExperimentConfig
-from evolution.config_files import load_config
-from evolution.run_directory import RunDirectory
-from evolution.study_directory import champions
+from epuck_mj.host import files
+from epuck_mj.policies import file as controller_file
+from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
+from epuck_mj.scene.starts import START_CLEARANCE
+from epuck_mj.step.control import Policy, TaskParameters
+from evolution.run.directory import RunDirectory
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.config_files import load_config
+from evolution.study.directory import champions
 
 LAST = "last"
 """Name of the latest generation."""

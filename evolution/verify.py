@@ -13,18 +13,19 @@ from pathlib import Path
 
 import tyro
 
-from epuck_mj import controller_file, files
-from epuck_mj.command_line import check_threads, main, parse
-from epuck_mj.controller_file import ControllerFile
 from epuck_mj.errors import UserError
-from evolution.champion import held_out_disturbances
-from evolution.config import ExperimentConfig
-from evolution.experiment import Purpose
-from evolution.held_out import Judging, judging
-from evolution.provenance import processor
-from evolution.run_directory import RunDirectory
-from evolution.study_data import check_scores
-from evolution.study_directory import champions
+from epuck_mj.host import files
+from epuck_mj.host.command_line import check_threads, main, parse
+from epuck_mj.policies import file as controller_file
+from epuck_mj.policies.file import ControllerFile
+from evolution.judging.held_out import Judging, judging
+from evolution.judging.starts import held_out_disturbances
+from evolution.run.directory import RunDirectory
+from evolution.run.provenance import processor
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.randomness import Purpose
+from evolution.study.data import check_scores
+from evolution.study.directory import champions
 
 MODULE = "evolution.verify"
 

@@ -10,7 +10,7 @@ os.environ["RERUN_STRICT"] = "1"
 
 import pytest
 
-from epuck_mj.model import Scene, load_scene
+from epuck_mj.scene.model import Scene, load_scene
 
 # ignored where tests run in the background of a script, and by all that they start
 signal.signal(signal.SIGINT, signal.default_int_handler)

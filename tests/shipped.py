@@ -1,6 +1,6 @@
 """The shipped optimisers: the paper's three and the baselines, by experiment."""
 
-from evolution.config_files import find_config, load_config
+from evolution.settings.config_files import find_config, load_config
 
 PAPERS = ("de-best", "de-rand", "ga")
 BASELINES = ("random-search", "one-plus-one-es", "cma-es")

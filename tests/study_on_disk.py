@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from epuck_mj.control import TaskParameters
-from epuck_mj.controller import Network
-from epuck_mj.controller_file import ControllerFile, Origin
-from evolution.config_files import find_config, load_config
-from evolution.study_config import StudyConfig
-from evolution.study_directory import StudyDirectory
+from epuck_mj.policies.file import ControllerFile, Origin
+from epuck_mj.policies.network import Network
+from epuck_mj.step.control import TaskParameters
+from evolution.settings.config_files import find_config, load_config
+from evolution.study.config import StudyConfig
+from evolution.study.directory import StudyDirectory
 
 ROBOTS = ("epuck_planar", "epuck")
 LEVELS = {"de-best": 220.0, "de-rand": 180.0, "ga": 120.0}
@@ -22,7 +22,7 @@ ORIGIN = Origin("epuck_planar", "arena")
 
 
 def held_out(mean: float, rng: np.random.Generator) -> dict:
-    """What `evolution.held_out.HeldOut` says of a champion, made up."""
+    """What `evolution.judging.held_out.HeldOut` says of a champion, made up."""
     follows = float(np.clip(mean / 230, 0, 1))
     return {
         "mean": mean,

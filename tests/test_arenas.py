@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy import spatial
 
-from epuck_mj.clearance import ClearanceProbe
-from epuck_mj.control import TaskParameters
-from epuck_mj.mjcf import MODELS
-from epuck_mj.model import load_scene
-from epuck_mj.starts import START_CLEARANCE, FreeSpace
-from epuck_mj.wall_follower import WallFollower
-from evolution.held_out import Judge
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.scene.clearance import ClearanceProbe
+from epuck_mj.scene.mjcf import MODELS
+from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.starts import START_CLEARANCE, FreeSpace
+from epuck_mj.step.control import TaskParameters
+from evolution.judging.held_out import Judge
 
 ARENAS = sorted(MODELS.glob("arenas/*.xml"))
 ROBOTS = ("epuck_planar", "epuck")

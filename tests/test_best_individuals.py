@@ -6,14 +6,14 @@ import shutil
 import numpy as np
 import pytest
 
-from epuck_mj import files
 from epuck_mj.errors import UserError
-from evolution import execution
-from evolution.config import ExperimentConfig
-from evolution.config_files import find_config, load_config
-from evolution.execution import Means, Run
+from epuck_mj.host import files
 from evolution.named_policies import named_policies
-from evolution.run_directory import RunDirectory
+from evolution.run import execution
+from evolution.run.directory import RunDirectory
+from evolution.run.execution import Means, Run
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.config_files import find_config, load_config
 
 EXPERIMENTS = ("cma-es", "de-best", "ga", "one-plus-one-es", "random-search")
 
@@ -56,8 +56,8 @@ def test_it_grows_with_history(tmp_path, experiment):
 
 def test_its_individuals_are_worth_what_it_says(tmp_path):
     """Genomes and fitness belong together: asked again on the same starts."""
-    from evolution.evaluation import evaluate
-    from evolution.experiment import Purpose, random_generator
+    from evolution.judging.evaluation import evaluate
+    from evolution.settings.randomness import Purpose, random_generator
 
     run = begun(tmp_path / "run", "random-search")
     run.start()

@@ -15,18 +15,18 @@ import pytest
 from rerun.chunk import RrdReader
 
 from epuck_mj.bridge.__main__ import bridge
-from epuck_mj.bridge.body import Wheel
 from epuck_mj.bridge.fake.endpoints import Pty, Tcp
-from epuck_mj.calibration import Calibration
+from epuck_mj.bridge.fake.motors_and_sensors import Wheel
 from epuck_mj.constants import SPEED_MAX, WHEEL_RADIUS
-from epuck_mj.control import TaskParameters
-from epuck_mj.controller import Network
-from epuck_mj.controller_file import ControllerFile, Origin
 from epuck_mj.errors import UserError
-from epuck_mj.interruption import SIGNALS, Interrupted, Interruption
-from epuck_mj.model import load_scene
-from epuck_mj.motors import STEP_ANGLE
-from epuck_mj.trajectory import Trajectory
+from epuck_mj.host.interruption import SIGNALS, Interrupted, Interruption
+from epuck_mj.policies.file import ControllerFile, Origin
+from epuck_mj.policies.network import Network
+from epuck_mj.scene.model import load_scene
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.step.motors import STEP_ANGLE
+from epuck_mj.trials.trajectory import Trajectory
 from tests.processes import PATIENCE, python_process
 from tests.test_fake import fake_process, living, wait_for
 

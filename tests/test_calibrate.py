@@ -15,14 +15,14 @@ import mujoco
 import numpy as np
 import pytest
 
-from epuck_mj.bridge.fake.body import MujocoBody
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Pty
+from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import scenario
 from epuck_mj.bridge.fake.virtual import VirtualPort, VirtualTime
-from epuck_mj.bridge.link import Link
-from epuck_mj.bridge.serial_line import SerialLine
-from epuck_mj.bridge.wifi_line import WifiLine
+from epuck_mj.bridge.line.link import Link
+from epuck_mj.bridge.line.serial_line import SerialLine
+from epuck_mj.bridge.line.wifi_line import WifiLine
 from epuck_mj.calibrate.__main__ import accomplish, calibrate
 from epuck_mj.calibrate.fitting import (
     SATURATED,
@@ -32,7 +32,6 @@ from epuck_mj.calibrate.fitting import (
     peaks,
 )
 from epuck_mj.calibrate.guide import CLEARANCES, STEPS, table
-from epuck_mj.calibration import Calibration
 from epuck_mj.constants import (
     BODY_RADIUS,
     N_PROXIMITY,
@@ -41,15 +40,16 @@ from epuck_mj.constants import (
     TRACK,
     WHEEL_RADIUS,
 )
-from epuck_mj.disturbances import Noise, calibrated
-from epuck_mj.disturbed_robots import DisturbedRobots
 from epuck_mj.errors import UserError
-from epuck_mj.interruption import SIGNALS
-from epuck_mj.mjcf import MODELS
-from epuck_mj.model import load_scene
-from epuck_mj.motors import STEP_ANGLE
-from epuck_mj.sensors import counted, proximity
-from epuck_mj.simulation import SimulatedRobots
+from epuck_mj.host.interruption import SIGNALS
+from epuck_mj.rungs.disturbed import DisturbedRobots
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.scene.mjcf import MODELS
+from epuck_mj.scene.model import load_scene
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.disturbances import Noise, calibrated
+from epuck_mj.step.motors import STEP_ANGLE
+from epuck_mj.step.sensors import counted, proximity
 from tests.processes import PATIENCE, python_process
 from tests.test_bridge import BUSY
 from tests.test_fake import behind, living, wait_for

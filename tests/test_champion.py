@@ -8,29 +8,33 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from epuck_mj import controller_file, files
-from epuck_mj.control import control_step
-from epuck_mj.controller_file import Origin
-from epuck_mj.sensors import observe
-from epuck_mj.simulation import SimulatedRobots
-from evolution import champion as champion_module
-from evolution import results
-from evolution.champion import (
-    LATEST_BEST,
+from epuck_mj.host import files
+from epuck_mj.policies import file as controller_file
+from epuck_mj.policies.file import Origin
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.step.control import control_step
+from epuck_mj.step.sensors import observe
+from evolution.judging import starts as starts_module
+from evolution.judging.held_out import Judge
+from evolution.judging.starts import (
     N_TEST,
-    candidates,
-    choose_champion,
     held_out_disturbances,
-    most_believed,
     starts_for_test,
     starts_for_validation,
 )
-from evolution.config import ExperimentConfig
-from evolution.config_files import find_config, load_config
-from evolution.experiment import Experiment, Purpose, Record
-from evolution.held_out import Judge
-from evolution.results import judges, summary, write_results
-from evolution.run_directory import RunDirectory
+from evolution.run import results
+from evolution.run.champion import (
+    LATEST_BEST,
+    candidates,
+    choose_champion,
+    most_believed,
+)
+from evolution.run.directory import RunDirectory
+from evolution.run.generation_loop import Experiment, Record
+from evolution.run.results import judges, summary, write_results
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.config_files import find_config, load_config
+from evolution.settings.randomness import Purpose
 
 SHIPPED = ("de-best", "de-rand", "ga")
 
@@ -149,7 +153,7 @@ def test_the_tenth_is_rounded_and_at_least_one(population, n):
 
 def test_the_champion_is_best_on_the_validation_starts(finished, monkeypatch):
     # the first starts are enough for a slow loop
-    monkeypatch.setattr(champion_module, "N_VALIDATION", 12)
+    monkeypatch.setattr(starts_module, "N_VALIDATION", 12)
     experiment, _ = finished
     starts = starts_for_validation(experiment.space)
     assert starts.shape == (12, 3)
@@ -336,7 +340,7 @@ def test_a_run_on_the_wheeled_robot_is_tested_on_the_plane_as_well(
 
 
 def test_a_champion_survives_the_checkpoint(finished, tmp_path, monkeypatch):
-    monkeypatch.setattr(champion_module, "N_VALIDATION", 12)
+    monkeypatch.setattr(starts_module, "N_VALIDATION", 12)
     experiment, _ = finished
     path = tmp_path / "checkpoint.npz"
     files.write_arrays(path, experiment.state())

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from evolution.config_files import find_config, load_config
-from evolution.report.claims import (
+from evolution.report.pairs import pair_rows, pairs_of
+from evolution.reproduce.claims import (
     Claim,
     claims,
     held_out_order,
@@ -18,10 +18,9 @@ from evolution.report.claims import (
     tally,
     unlike,
 )
-from evolution.report.first_generation import FirstGeneration, first_generation
-from evolution.report.pairs import pair_rows, pairs_of
-from evolution.report.reproduction import reproduction
-from evolution.report.verdicts import (
+from evolution.reproduce.document import reproduction
+from evolution.reproduce.first_generation import FirstGeneration, first_generation
+from evolution.reproduce.verdicts import (
     CONSISTENT,
     HANGS_ON_READING,
     INCONSISTENT,
@@ -35,7 +34,8 @@ from evolution.report.verdicts import (
     of_best,
     of_most,
 )
-from evolution.study_data import RunData, StudyData
+from evolution.settings.config_files import find_config, load_config
+from evolution.study.data import RunData, StudyData
 
 NAMES = ("de-best", "de-rand", "ga")
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from epuck_mj.clearance import CHUNK, CLEARANCE_MAX, ClearanceProbe
 from epuck_mj.constants import BODY_RADIUS
 from epuck_mj.errors import UserError
-from epuck_mj.model import load_scene
+from epuck_mj.scene.clearance import CHUNK, CLEARANCE_MAX, ClearanceProbe
+from epuck_mj.scene.model import load_scene
 
 ACCURACY = 1e-8
 """Of distances [m]."""

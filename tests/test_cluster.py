@@ -20,12 +20,12 @@ import yaml
 from distributed import Client
 
 from epuck_mj.errors import UserError
-from evolution.cluster import carry_out_on_cluster, connection, requirements
-from evolution.config import ExperimentConfig
-from evolution.config_files import find_config, load_config
-from evolution.execution import Means
-from evolution.jobs import Event, Job, carry_out, generations
-from evolution.study import study
+from evolution.run.execution import Means
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.config_files import find_config, load_config
+from evolution.study.__main__ import study
+from evolution.study.cluster import carry_out_on_cluster, connection, requirements
+from evolution.study.jobs import Event, Job, carry_out, generations
 
 pytestmark = pytest.mark.slow
 
@@ -40,12 +40,14 @@ REPRODUCED = ("history.csv", "champion.json")
 
 # pictures are not drawn and few starts held out, here and by every worker
 QUICKER = """
-from evolution import champion, held_out, results
+from evolution.judging import held_out, starts
+from evolution.run import results
+
 
 QUICKER = [
     (results, "_draw_fitness", lambda *_: None),
     (results, "_show", lambda *_: None),
-    (champion, "N_VALIDATION", 10),
+    (starts, "N_VALIDATION", 10),
     (held_out.Judge.starts, "__defaults__", (10,)),
     (held_out.Judge.test, "__defaults__", (10, None)),
 ]
@@ -420,11 +422,13 @@ def test_nothing_to_do_needs_no_cluster():
 
 
 def test_without_the_extra_there_is_one_clear_line(monkeypatch):
-    for name in [name for name in sys.modules if name.startswith("evolution.cluster")]:
+    for name in [
+        name for name in sys.modules if name.startswith("evolution.study.cluster")
+    ]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(UserError, match=r"pip install 'epuck-mj\[cluster\]'$"):
-        __import__("evolution.cluster")
+        __import__("evolution.study.cluster")
 
 
 # the command line

@@ -4,9 +4,14 @@ import numpy as np
 import pytest
 from cmaes import CMA
 
-from evolution.cma_es import CmaEs, CmaEsParameters, made_finite
-from evolution.search_space import SearchSpace
-from evolution.stagnation import has_stagnated, stagnation_window
+from evolution.search.cma_es import (
+    CmaEs,
+    CmaEsParameters,
+    has_stagnated,
+    made_finite,
+    stagnation_window,
+)
+from evolution.search.search_space import SearchSpace
 
 SPACE = SearchSpace(genes=3, lower=-5, upper=5, init_lower=-5, init_upper=5)
 

@@ -9,8 +9,8 @@ from pydantic import ValidationError
 
 from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
 from epuck_mj.errors import UserError
-from evolution.config import ExperimentConfig
-from evolution.config_files import (
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.config_files import (
     CONFIGS,
     find_config,
     load_config,

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from epuck_mj.controller import Controller, Network
+from epuck_mj.policies.network import Controller, Network
 
 
 def sigmoid(x: float) -> float:

@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from epuck_mj.control import TaskParameters
-from epuck_mj.controller import Network
-from epuck_mj.controller_file import ControllerFile, Origin, load
 from epuck_mj.errors import UserError
+from epuck_mj.policies.file import ControllerFile, Origin, load
+from epuck_mj.policies.network import Network
+from epuck_mj.step.control import TaskParameters
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from benchmarks.convergence import (
     held_out_starts,
     mean_fitness,
 )
-from epuck_mj.model import load_scene
+from epuck_mj.scene.model import load_scene
 
 N_STARTS = 60
 """A third of the benchmark's; it takes one changed outcome to move a mean by 1.7 %."""

@@ -9,15 +9,15 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evolution.bounds import BOUNDS_RULES
-from evolution.differential_evolution import (
+from evolution.search.bounds import BOUNDS_RULES
+from evolution.search.differential_evolution import (
     STRATEGIES,
     DifferentialEvolution,
     DifferentialEvolutionParameters,
     binomial_crossover,
     distinct_parents,
 )
-from evolution.search_space import SearchSpace
+from evolution.search.search_space import SearchSpace
 
 # Neither a slow machine nor a lucky draw decides a test.
 steady = settings(deadline=None, derandomize=True)

@@ -6,11 +6,16 @@ import json
 import numpy as np
 import pytest
 
-from epuck_mj.calibration import Calibration
 from epuck_mj.constants import STEP_RATE_MAX, TRACK, WHEEL_RADIUS
-from epuck_mj.control import TaskParameters
-from epuck_mj.controller import Network
-from epuck_mj.disturbances import (
+from epuck_mj.errors import UserError
+from epuck_mj.policies.network import Network
+from epuck_mj.rungs.disturbed import DisturbedRobots
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.robot_parts import ROBOT_BODY
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.step.disturbances import (
     BOOK,
     NOISE,
     RANGES,
@@ -19,17 +24,12 @@ from epuck_mj.disturbances import (
     calibrated,
     draw,
 )
-from epuck_mj.disturbed_robots import DisturbedRobots
-from epuck_mj.errors import UserError
-from epuck_mj.interface import ROBOT_BODY
-from epuck_mj.model import load_scene
-from epuck_mj.motors import wheel_speeds
-from epuck_mj.sensors import proximity
-from epuck_mj.simulation import SimulatedRobots
-from evolution import evaluation
-from evolution.config import ExperimentConfig
-from evolution.evaluation import BatchEngine, DmControlEngine, Work, evaluate
-from evolution.experiment import Experiment, make_engine
+from epuck_mj.step.motors import wheel_speeds
+from epuck_mj.step.sensors import proximity
+from evolution.judging import evaluation
+from evolution.judging.evaluation import BatchEngine, DmControlEngine, Work, evaluate
+from evolution.run.generation_loop import Experiment, make_engine
+from evolution.settings.config import ExperimentConfig
 
 TASK = TaskParameters(steps=40)
 STEPS = TASK.steps

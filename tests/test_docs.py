@@ -42,8 +42,9 @@ def extended(tmp_path_factory) -> Path:
     ignored = shutil.ignore_patterns("__pycache__")
     for name in ("epuck_mj", "evolution", "models", "tests"):
         shutil.copytree(ROOT / name, folder / name, ignore=ignored)
-    (folder / "evolution" / "particle_swarm.py").write_text(blocks("python")[1])
-    path = folder / "evolution" / "optimizer.py"
+    search = folder / "evolution" / "search"
+    (search / "particle_swarm.py").write_text(blocks("python")[1])
+    path = search / "table.py"
     text = path.read_text()
     (patch,) = blocks("diff")
     for hunk in patch.strip("\n").split("\n\n"):
@@ -87,7 +88,7 @@ def test_an_optimiser_of_ones_own_in_a_study(extended):
     )
     assert one == other
     code = (
-        "from pathlib import Path; from evolution.study_config import StudyConfig; "
+        "from pathlib import Path; from evolution.study.config import StudyConfig; "
         "print(*StudyConfig.load(Path('mine.yaml')).experiments)"
     )
     assert python("-c", code, cwd=extended).stdout.split() == [

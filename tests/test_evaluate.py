@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from epuck_mj.calibration import Calibration
-from epuck_mj.controller_file import load
 from epuck_mj.errors import UserError
-from epuck_mj.files import read_arrays
-from epuck_mj.model import load_scene
-from evolution.config import ExperimentConfig
-from evolution.config_files import find_config, load_config
+from epuck_mj.host.files import read_arrays
+from epuck_mj.policies.file import load
+from epuck_mj.scene.model import load_scene
+from epuck_mj.step.calibration import Calibration
 from evolution.evaluate import evaluate
-from evolution.execution import Means, Run
-from evolution.held_out import Judge
-from evolution.run_directory import RunDirectory
+from evolution.judging.held_out import Judge
+from evolution.run.directory import RunDirectory
+from evolution.run.execution import Means, Run
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.config_files import find_config, load_config
 from evolution.verify import verify
 
 
@@ -121,8 +121,8 @@ def test_bad_input_gets_one_line(arguments, message, tmp_path, monkeypatch):
 
 
 def test_threads_change_nothing(scene):
-    from epuck_mj.control import TaskParameters
-    from epuck_mj.wall_follower import WallFollower
+    from epuck_mj.policies.wall_follower import WallFollower
+    from epuck_mj.step.control import TaskParameters
 
     tests = [
         Judge(scene, TaskParameters(steps=50), 0.01, threads).test(WallFollower(), 300)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from epuck_mj.control import TaskParameters
-from epuck_mj.controller import Network
-from epuck_mj.starts import FreeSpace
-from epuck_mj.trajectory import record
-from evolution import evaluation
-from evolution.evaluation import BatchEngine, DmControlEngine, evaluate
+from epuck_mj.policies.network import Network
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.trials.trajectory import record
+from evolution.judging import evaluation
+from evolution.judging.evaluation import BatchEngine, DmControlEngine, evaluate
 
 TASK = TaskParameters(steps=30)
 NETWORK = Network()

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from evolution.bounds import BOUNDS_RULES
-from evolution.evolution_strategy import (
+from evolution.search.bounds import BOUNDS_RULES
+from evolution.search.evolution_strategy import (
     SIGMA_MIN,
     EvolutionStrategy,
     EvolutionStrategyParameters,
     one_fifth_rule,
 )
-from evolution.search_space import SearchSpace
+from evolution.search.search_space import SearchSpace
 
 SPACE = SearchSpace(genes=3, lower=-5, upper=5, init_lower=-5, init_upper=5)
 

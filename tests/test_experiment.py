@@ -6,20 +6,15 @@ from dataclasses import astuple, replace
 import numpy as np
 import pytest
 
-from epuck_mj.control import TaskParameters, control_step
 from epuck_mj.errors import UserError
-from epuck_mj.sensors import observe
-from epuck_mj.simulation import SimulatedRobots
-from evolution.champion import starts_for_test, starts_for_validation
-from evolution.config import ExperimentConfig
-from evolution.config_files import find_config, load_config
-from evolution.experiment import (
-    HISTORY,
-    Experiment,
-    Purpose,
-    Record,
-    random_generator,
-)
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.step.control import TaskParameters, control_step
+from epuck_mj.step.sensors import observe
+from evolution.judging.starts import starts_for_test, starts_for_validation
+from evolution.run.generation_loop import HISTORY, Experiment, Record
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.config_files import find_config, load_config
+from evolution.settings.randomness import Purpose, random_generator
 
 SHIPPED = ("de-best", "de-rand", "ga")
 every_experiment = pytest.mark.parametrize("name", SHIPPED)

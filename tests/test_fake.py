@@ -15,19 +15,19 @@ import pytest
 
 from epuck_mj.bridge.errors import LinkLost
 from epuck_mj.bridge.fake.__main__ import fake
-from epuck_mj.bridge.fake.body import MujocoBody
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Endpoint, Pty, Tcp, serve
+from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import scenario
-from epuck_mj.bridge.link import Link
-from epuck_mj.bridge.protocol import RESYNC, Steps, ascii
-from epuck_mj.bridge.serial_line import SerialLine
-from epuck_mj.bridge.serial_port import SerialPort
+from epuck_mj.bridge.language.protocol import RESYNC, Steps, ascii
+from epuck_mj.bridge.line.link import Link
+from epuck_mj.bridge.line.serial_line import SerialLine
+from epuck_mj.bridge.line.serial_port import SerialPort
 from epuck_mj.constants import TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
-from epuck_mj.files import read_arrays
-from epuck_mj.model import Scene, load_scene
-from epuck_mj.motors import STEP_ANGLE
+from epuck_mj.host.files import read_arrays
+from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.step.motors import STEP_ANGLE
 from tests.processes import PATIENCE, python_process
 
 

@@ -9,16 +9,16 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.image import imread
 from matplotlib.patches import Polygon
 
-from epuck_mj.control import TaskParameters
 from epuck_mj.errors import UserError
-from epuck_mj.model import load_scene
-from epuck_mj.outline import _outline, shell_outline, wall_outlines
-from epuck_mj.pictures import save_figure
-from epuck_mj.trajectory import record
-from evolution.figures import (
+from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.outline import _outline, shell_outline, wall_outlines
+from epuck_mj.show.figures import (
     fitness_figure,
     trajectory_figure,
 )
+from epuck_mj.show.pictures import save_figure
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.trials.trajectory import record
 
 TASK = TaskParameters(steps=40)
 EVALUATIONS = np.arange(1, 11) * 100

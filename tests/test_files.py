@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from epuck_mj import files
 from epuck_mj.errors import UserError
+from epuck_mj.host import files
 
 
 class StopError(BaseException):

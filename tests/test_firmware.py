@@ -8,11 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from epuck_mj.bridge.body import MotorTimer, Wheel
-from epuck_mj.bridge.builds import BUILDS
-from epuck_mj.bridge.firmware import Firmware
-from epuck_mj.bridge.packets import PacketParser
-from epuck_mj.bridge.protocol import (
+from epuck_mj.bridge.fake.builds import BUILDS
+from epuck_mj.bridge.fake.firmware import Firmware
+from epuck_mj.bridge.fake.motors_and_sensors import MotorTimer, Wheel
+from epuck_mj.bridge.fake.wifi_firmware import WifiFirmware
+from epuck_mj.bridge.fake.wire import Wire
+from epuck_mj.bridge.language.packets import PacketParser
+from epuck_mj.bridge.language.protocol import (
     RESYNC,
     Acknowledged,
     Ambient,
@@ -31,8 +33,6 @@ from epuck_mj.bridge.protocol import (
     greets,
     packets,
 )
-from epuck_mj.bridge.wifi_firmware import WifiFirmware
-from epuck_mj.bridge.wire import Wire
 from epuck_mj.constants import BYTE_TIME, CALIBRATION_SAMPLES, PROXIMITY_PERIOD
 
 quick = settings(deadline=None, max_examples=60)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from epuck_mj.errors import UserError
-from epuck_mj.fitness import STEP_FITNESS, literal, product, step_fitness
+from epuck_mj.step.fitness import STEP_FITNESS, literal, product, step_fitness
 
 
 def seen(nearest: float) -> np.ndarray:

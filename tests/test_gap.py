@@ -10,12 +10,12 @@ import pytest
 from matplotlib.image import imread
 
 from epuck_mj.constants import TRACK, WHEEL_RADIUS
-from epuck_mj.control import TaskParameters
 from epuck_mj.errors import UserError
-from epuck_mj.motors import Speeds
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.step.motors import Speeds
 from evolution.gap import worlds as gap_worlds
-from evolution.gap.command import gap
+from evolution.gap.__main__ import gap
 from evolution.gap.document import document
 from evolution.gap.groups import experiments, peers
 from evolution.gap.measure import Outcome, abroad, ideal
@@ -27,7 +27,7 @@ from evolution.gap.transfer import (
 )
 from evolution.gap.worlds import ARENAS, LATENCY_MAX, RANGES, World, met, worlds
 from evolution.named_policies import NamedPolicy, named_policies
-from evolution.report.blocks import to_markdown
+from evolution.pages.blocks import to_markdown
 
 CHAMPION = Path(__file__).parent.parent / "results/paper/de-best/seed-1/champion.json"
 HOME = World(

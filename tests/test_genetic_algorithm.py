@@ -6,7 +6,7 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evolution.genetic_algorithm import (
+from evolution.search.genetic_algorithm import (
     GeneticAlgorithm,
     GeneticAlgorithmParameters,
     decode,
@@ -14,7 +14,7 @@ from evolution.genetic_algorithm import (
     one_point_crossover,
     tournament_winners,
 )
-from evolution.search_space import SearchSpace
+from evolution.search.search_space import SearchSpace
 
 # Neither a slow machine nor a lucky draw decides a test.
 steady = settings(deadline=None, derandomize=True)

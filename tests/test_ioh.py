@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from evolution.report.ioh import FUNCTION, HEADER, LOWEST, export, improvements
-from evolution.study_data import RunData, load_study
+from evolution.study.data import RunData, load_study
 from tests.study_on_disk import LEVELS, history, write_study
 
 SEEDS = {"de-best": [1, 2, 7], "ga": [3], "de-rand": []}

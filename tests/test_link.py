@@ -9,9 +9,16 @@ import tty
 import pytest
 
 from epuck_mj.bridge.errors import BridgeError, LinkLost, NoReply, RobotRestarted
-from epuck_mj.bridge.link import Link
-from epuck_mj.bridge.protocol import RESYNC, Battery, Speeds, Version, ascii, binary
-from epuck_mj.bridge.serial_port import SerialPort, ports
+from epuck_mj.bridge.language.protocol import (
+    RESYNC,
+    Battery,
+    Speeds,
+    Version,
+    ascii,
+    binary,
+)
+from epuck_mj.bridge.line.link import Link
+from epuck_mj.bridge.line.serial_port import SerialPort, ports
 from epuck_mj.errors import UserError
 
 VERSION = b"v,Version 1.2.2 August 2008 GCtronic\r\nHW version: 1.1\r\n"
@@ -278,7 +285,7 @@ def test_a_port_is_closed_if_no_guardian_can_be_had(monkeypatch):
     def refuse(*_) -> None:
         raise BlockingIOError(11, "no more processes")
 
-    monkeypatch.setattr("epuck_mj.bridge.serial_port.guardian.hire", refuse)
+    monkeypatch.setattr("epuck_mj.bridge.line.serial_port.guardian.hire", refuse)
     monkeypatch.setattr(SerialPort, "close", lambda port: closed.append(port.name))
     with pytest.raises(UserError, match="no guardian for 'loop://'"):
         SerialPort("loop://", farewell=b"D,0,0")

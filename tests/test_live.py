@@ -12,12 +12,12 @@ import pytest
 from rerun.chunk import RrdReader
 
 from epuck_mj.errors import UserError
-from evolution import live
-from evolution.held_out import Judge
+from evolution.judging.held_out import Judge
 from evolution.replay.viewer import viewer_binary
 from evolution.replay.web import free_ports
-from evolution.run import run
-from evolution.run_directory import RunDirectory
+from evolution.run import live
+from evolution.run.__main__ import run
+from evolution.run.directory import RunDirectory
 
 ARGUMENTS = ("ga", "--evaluations", "500", "--steps", "15", "--threads", "1")
 SAME = ("history.csv", "champion.json", "best_individuals.npz", "trajectory.npz")

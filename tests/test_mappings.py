@@ -3,7 +3,7 @@
 import pytest
 
 from epuck_mj.errors import UserError
-from epuck_mj.mappings import parse_yaml, read_json, read_yaml, to_yaml
+from epuck_mj.host.yaml_and_json import parse_yaml, read_json, read_yaml, to_yaml
 
 
 def refused(read, path, content: bytes) -> str:

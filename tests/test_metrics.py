@@ -5,7 +5,16 @@ import dataclasses
 import numpy as np
 import pytest
 
-from epuck_mj.behaviour_classes import (
+from epuck_mj.constants import BODY_RADIUS, SPEED_MAX, TRACK, WHEEL_RADIUS
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.scene.clearance import CLEARANCE_MAX, ClearanceProbe
+from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.scene.wall_loops import WallLoops, wall_loops
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.step.motors import Speeds
+from epuck_mj.trials.behaviour_classes import (
     CLASSES,
     HUG,
     MEANINGS,
@@ -13,17 +22,8 @@ from epuck_mj.behaviour_classes import (
     behaviour_classes,
     class_shares,
 )
-from epuck_mj.clearance import CLEARANCE_MAX, ClearanceProbe
-from epuck_mj.constants import BODY_RADIUS, SPEED_MAX, TRACK, WHEEL_RADIUS
-from epuck_mj.control import TaskParameters
-from epuck_mj.metrics import Behaviour, behaviour
-from epuck_mj.model import load_scene
-from epuck_mj.motors import Speeds
-from epuck_mj.simulation import SimulatedRobots
-from epuck_mj.starts import FreeSpace
-from epuck_mj.tracks import Tracks, record_tracks
-from epuck_mj.wall_follower import WallFollower
-from epuck_mj.wall_loops import WallLoops, wall_loops
+from epuck_mj.trials.metrics import Behaviour, behaviour
+from epuck_mj.trials.tracks import Tracks, record_tracks
 
 STEP = 0.01
 """Way of a control step in trials drawn by hand [m]: 0.1 m/s."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from epuck_mj.constants import SPEED_MAX, TRACK, WHEEL_RADIUS, WHEEL_SPEED_MAX
-from epuck_mj.motors import STEP_ANGLE, Speeds, actual_rates, command, step_rates
+from epuck_mj.step.motors import STEP_ANGLE, Speeds, actual_rates, command, step_rates
 
 
 @pytest.mark.parametrize(

@@ -6,18 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from epuck_mj import files
-from epuck_mj.control import TaskParameters
-from epuck_mj.controller import Network
-from epuck_mj.controller_file import ControllerFile, Origin
 from epuck_mj.errors import UserError
-from epuck_mj.wall_follower import WallFollower
-from evolution.config import ExperimentConfig
-from evolution.config_files import find_config, load_config
-from evolution.execution import Means, Run
+from epuck_mj.host import files
+from epuck_mj.policies.file import ControllerFile, Origin
+from epuck_mj.policies.network import Network
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.step.control import TaskParameters
 from evolution.named_policies import NamedPolicy, described, named_policies
 from evolution.replay.trials import labels
-from evolution.run_directory import RunDirectory
+from evolution.run.directory import RunDirectory
+from evolution.run.execution import Means, Run
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.config_files import find_config, load_config
 
 GENERATIONS = 3
 

@@ -6,8 +6,8 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from evolution.evolution_strategy import EvolutionStrategyParameters
-from evolution.optimizer import (
+from evolution.search.evolution_strategy import EvolutionStrategyParameters
+from evolution.search.table import (
     ALGORITHMS,
     AskTellError,
     Optimizer,

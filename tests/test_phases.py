@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from epuck_mj.clearance import ClearanceProbe
 from epuck_mj.constants import N_PROXIMITY, PROXIMITY_RANGE
-from epuck_mj.control import TaskParameters
-from epuck_mj.model import load_scene
-from epuck_mj.phases import (
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.scene.clearance import ClearanceProbe
+from epuck_mj.scene.model import load_scene
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.trials.phases import (
     CORNERING,
     CORNERING_TIME,
     CORNERING_TURN,
@@ -17,8 +18,7 @@ from epuck_mj.phases import (
     SEARCHING,
     phases,
 )
-from epuck_mj.trajectory import Trajectory, record
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.trials.trajectory import Trajectory, record
 
 CONTROL_STEP = 0.1
 HALF = round(CORNERING_TIME / CONTROL_STEP / 2)

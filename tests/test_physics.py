@@ -6,7 +6,7 @@ import pytest
 from mujoco.batch import Batch
 
 from epuck_mj import constants as c
-from epuck_mj.model import load_scene
+from epuck_mj.scene.model import load_scene
 
 OPEN = """<mujoco>
   <option timestep="0.01" integrator="implicitfast"/>

@@ -10,8 +10,8 @@ import sys
 import termios
 from pathlib import Path
 
-from evolution.experiment import Record
-from evolution.progress import LINES, Progress
+from evolution.run.generation_loop import Record
+from evolution.run.progress import LINES, Progress
 
 ROOT = Path(__file__).resolve().parent.parent
 BUDGET = 4000

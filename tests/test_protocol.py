@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from epuck_mj.bridge.packets import PacketParser
-from epuck_mj.bridge.protocol import (
+from epuck_mj.bridge.language.packets import PacketParser
+from epuck_mj.bridge.language.protocol import (
     RESYNC,
     Acknowledged,
     Ambient,

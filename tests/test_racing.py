@@ -9,19 +9,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from epuck_mj.control import TaskParameters, Trials, run_trials
-from epuck_mj.controller import Network
-from epuck_mj.fitness import STEP_FITNESS, STEP_FITNESS_MAX
-from epuck_mj.model import load_scene
-from epuck_mj.simulation import SimulatedRobots
-from epuck_mj.starts import FreeSpace
-from epuck_mj.trajectory import record
-from evolution import champion, evaluation
-from evolution.champion import choose_champion
-from evolution.config import ExperimentConfig
-from evolution.config_files import find_config, load_config
-from evolution.evaluation import ROUNDING, BatchEngine, Race, evaluate
-from evolution.experiment import Experiment
+from epuck_mj.policies.network import Network
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.control import TaskParameters, Trials, run_trials
+from epuck_mj.step.fitness import STEP_FITNESS, STEP_FITNESS_MAX
+from epuck_mj.trials.trajectory import record
+from evolution.judging import evaluation
+from evolution.judging import starts as starts_module
+from evolution.judging.evaluation import ROUNDING, BatchEngine, Race, evaluate
+from evolution.run.champion import choose_champion
+from evolution.run.generation_loop import Experiment
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.config_files import find_config, load_config
 from tests.shipped import OPTIMIZERS
 
 SCENE = load_scene("epuck_planar", "arena")
@@ -301,7 +302,7 @@ def test_dm_control_gives_the_same_bytes_as_a_race(name):
 
 @pytest.mark.parametrize("name", RACES[:2])
 def test_the_same_champion_is_chosen(name, monkeypatch):
-    monkeypatch.setattr(champion, "N_VALIDATION", 20)
+    monkeypatch.setattr(starts_module, "N_VALIDATION", 20)
     config = small(name)
     chosen = []
     for racing in (True, False):

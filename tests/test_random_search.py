@@ -6,8 +6,8 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evolution.random_search import RandomSearch, RandomSearchParameters, best_of
-from evolution.search_space import SearchSpace
+from evolution.search.random_search import RandomSearch, RandomSearchParameters, best_of
+from evolution.search.search_space import SearchSpace
 
 # Neither a slow machine nor a lucky draw decides a test.
 steady = settings(deadline=None, derandomize=True)

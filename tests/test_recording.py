@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from epuck_mj.clearance import ClearanceProbe
-from epuck_mj.colors import TRIALS
-from epuck_mj.control import TaskParameters
-from epuck_mj.controller import Network
 from epuck_mj.errors import UserError
-from epuck_mj.geometry import drawn
-from epuck_mj.interface import PROXIMITY
-from epuck_mj.model import load_scene
-from epuck_mj.phases import PHASES, phases
-from epuck_mj.recording import Trial, save_recording
-from epuck_mj.recording.entities import entities
-from epuck_mj.trajectory import record
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.policies.network import Network
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.scene.clearance import ClearanceProbe
+from epuck_mj.scene.geometry import drawn
+from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.robot_parts import PROXIMITY
+from epuck_mj.show.colors import TRIALS
+from epuck_mj.show.recording import Trial, save_recording
+from epuck_mj.show.recording.entities import entities
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.trials.phases import PHASES, phases
+from epuck_mj.trials.trajectory import record
 
 TASK = TaskParameters(steps=40)
 START, BESIDE_A_WALL = np.array([[0.4, 0.1, 0.4], [0.35, -0.2, 0.2]])
@@ -366,11 +366,11 @@ def test_saving_needs_no_opengl_and_says_nothing(tmp_path):
     code = """
 import sys
 import numpy as np
-from epuck_mj.control import TaskParameters
-from epuck_mj.model import load_scene
-from epuck_mj.recording import Trial, save_recording
-from epuck_mj.trajectory import record
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.scene.model import load_scene
+from epuck_mj.show.recording import Trial, save_recording
+from epuck_mj.trials.trajectory import record
+from epuck_mj.policies.wall_follower import WallFollower
 
 scene, task = load_scene("epuck", "arena"), TaskParameters(steps=5)
 trial = Trial("a", record(scene, WallFollower(), np.zeros(3), task), task)

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from epuck_mj import render
-from epuck_mj.colors import HIGH_FITNESS, LOW_FITNESS, TRIALS
-from epuck_mj.control import TaskParameters
 from epuck_mj.errors import UserError
-from epuck_mj.model import load_scene
-from epuck_mj.render import painter
-from epuck_mj.trajectory import record
+from epuck_mj.scene.model import load_scene
+from epuck_mj.show import render
+from epuck_mj.show.colors import HIGH_FITNESS, LOW_FITNESS, TRIALS
+from epuck_mj.show.render import painter
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.trials.trajectory import record
 
 TASK = TaskParameters(steps=40)
 SIZE = (300, 200)

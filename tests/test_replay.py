@@ -8,19 +8,20 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from epuck_mj import files
-from epuck_mj.control import TaskParameters
-from epuck_mj.controller import Network
-from epuck_mj.controller_file import ControllerFile, Origin, load
 from epuck_mj.errors import UserError
-from epuck_mj.model import load_scene
-from epuck_mj.starts import FreeSpace
-from epuck_mj.trajectory import Trajectory, record
-from evolution.champion import starts_for_test, starts_for_validation
-from evolution.config import ExperimentConfig
-from evolution.config_files import find_config, load_config
-from evolution.replay import command, viewer
-from evolution.replay.command import replay
+from epuck_mj.host import files
+from epuck_mj.policies.file import ControllerFile, Origin, load
+from epuck_mj.policies.network import Network
+from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.trials.trajectory import Trajectory, record
+from evolution.judging.starts import starts_for_test, starts_for_validation
+from evolution.replay import __main__ as command
+from evolution.replay import viewer
+from evolution.replay.__main__ import replay
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.config_files import find_config, load_config
 
 STEPS = 8
 SAVED = re.compile(r"(?P<path>\S+\.rrd); watch it: \S+ -m rerun (?P=path)")

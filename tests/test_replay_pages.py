@@ -17,7 +17,7 @@ from rerun.experimental import ViewerClient
 
 from benchmarks.viewer_picture import picture, viewer
 from epuck_mj.errors import UserError
-from evolution.replay.command import replay
+from evolution.replay.__main__ import replay
 from tests.browser import MISSING, browser, until
 from tests.processes import python_process
 

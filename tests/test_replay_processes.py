@@ -16,13 +16,13 @@ from matplotlib.image import imread
 from rerun.chunk import RrdReader
 from rerun.experimental import ViewerClient
 
-from epuck_mj import render
-from epuck_mj.control import TaskParameters
-from epuck_mj.controller import Network
-from epuck_mj.controller_file import ControllerFile, Origin
 from epuck_mj.errors import UserError
-from evolution.replay import command
-from evolution.replay.command import replay
+from epuck_mj.policies.file import ControllerFile, Origin
+from epuck_mj.policies.network import Network
+from epuck_mj.show import render
+from epuck_mj.step.control import TaskParameters
+from evolution.replay import __main__ as command
+from evolution.replay.__main__ import replay
 from tests.browser import until
 
 ROOT = Path(__file__).parent.parent
@@ -55,8 +55,8 @@ def here(alone, monkeypatch):
 
 
 PATIENT = """
-from epuck_mj.command_line import main
-from evolution.replay import command, viewer
+from epuck_mj.host.command_line import main
+from evolution.replay import __main__ as command, viewer
 
 viewer.SETTLING_TIME = 100
 main(command.replay)
@@ -261,6 +261,6 @@ def test_without_opengl_only_pictures_are_missing(here, monkeypatch):
 
 def test_without_the_video_extra_one_line_says_so(here, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    monkeypatch.delitem(sys.modules, "epuck_mj.video", raising=False)
+    monkeypatch.delitem(sys.modules, "epuck_mj.show.video", raising=False)
     with pytest.raises(UserError, match=r"pip install 'epuck-mj\[video\]'"):
         replay(["champion.json", "--video", "a.mp4"])

@@ -18,9 +18,7 @@ import yaml
 from scipy import stats
 
 from epuck_mj.errors import UserError
-from evolution.comparisons import holm
-from evolution.report import command as module
-from evolution.report.blocks import (
+from evolution.pages.blocks import (
     Code,
     Heading,
     Listing,
@@ -30,17 +28,20 @@ from evolution.report.blocks import (
     to_html,
     to_markdown,
 )
-from evolution.report.command import report, tables
+from evolution.pages.files import csv_text
+from evolution.pages.words import spread
+from evolution.report import __main__ as module
+from evolution.report.__main__ import report, tables
 from evolution.report.findings import WITH_NOISE, held_out_fitness, luck
 from evolution.report.pairs import compared, pair_rows
 from evolution.report.samples import TARGET_SHARES
 from evolution.report.successes import FOLLOWS, MATCHES, success_rows
 from evolution.report.summary import summary, summary_text
-from evolution.report.tables import BEST_STORED, csv_text, run_rows, target_rows
-from evolution.report.words import spread
-from evolution.statistics import rank_correlation
-from evolution.study_config import seeds_text
-from evolution.study_data import load_study
+from evolution.report.tables import BEST_STORED, run_rows, target_rows
+from evolution.statistics.comparisons import holm
+from evolution.statistics.samples import rank_correlation
+from evolution.study.config import seeds_text
+from evolution.study.data import load_study
 from tests.study_on_disk import LEVELS, ROBOTS, history, write_study
 
 NAMES = tuple(LEVELS)

@@ -12,13 +12,15 @@ from matplotlib.image import imread
 from matplotlib.legend import Legend
 from matplotlib.patches import Rectangle
 
-from epuck_mj.behaviour_classes import CLASSES
-from epuck_mj.control import TaskParameters
-from epuck_mj.controller import Network
-from epuck_mj.controller_file import ControllerFile, Origin
 from epuck_mj.errors import UserError
-from evolution.config_files import find_config, load_config
-from evolution.report.figures import FIGURES, figures, save
+from epuck_mj.policies.file import ControllerFile, Origin
+from epuck_mj.policies.network import Network
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.trials.behaviour_classes import CLASSES
+from evolution.pages.files import save
+from evolution.pages.style import LOOKS, looks
+from evolution.pages.words import label
+from evolution.report.figures import FIGURES, figures
 from evolution.report.figures.behaviour import (
     CLASS_LOOKS,
     behaviour,
@@ -34,10 +36,9 @@ from evolution.report.figures.curves import (
     on_grid,
     targets,
 )
-from evolution.report.figures.style import LOOKS, looks
 from evolution.report.samples import TARGET_SHARES
-from evolution.report.words import label
-from evolution.study_data import RunData, StudyData
+from evolution.settings.config_files import find_config, load_config
+from evolution.study.data import RunData, StudyData
 
 ROBOTS = ("epuck_planar", "epuck")
 STEPS = 300

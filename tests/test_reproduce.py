@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from epuck_mj.errors import UserError
-from evolution import reproduce as module
-from evolution.report.verdicts import OTHER_STUDY
-from evolution.reproduce import reproduce
+from evolution.reproduce import __main__ as module
+from evolution.reproduce.__main__ import reproduce
+from evolution.reproduce.verdicts import OTHER_STUDY
 
 TINY = """
 experiments: [ga.yaml, de-best.yaml]
@@ -46,7 +46,7 @@ def test_one_command_runs_reports_and_judges_and_goes_on(here, monkeypatch, capf
     assert len(runs) == 4
     # again: what is done is not done once more
     before = [path.stat().st_mtime_ns for path in runs]
-    monkeypatch.setattr("evolution.report.command.figures", lambda data: iter(()))
+    monkeypatch.setattr("evolution.report.__main__.figures", lambda data: iter(()))
     assert reproduce(["--quick", "--output", "out"]) == 0
     assert [path.stat().st_mtime_ns for path in runs] == before
     assert (here / "out" / "REPRODUCTION.md").read_text() == first

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from benchmarks.publish import shipped, with_tables
-from epuck_mj.mjcf import MODELS
+from epuck_mj.scene.mjcf import MODELS
 from evolution.gap.document import document, summary
 from evolution.gap.groups import experiments, peers
 from evolution.gap.transfer import Transfer
 from evolution.named_policies import named_policies
-from evolution.report.blocks import to_markdown
-from evolution.study_config import StudyConfig, find_study
-from evolution.study_data import load_study
+from evolution.pages.blocks import to_markdown
+from evolution.study.config import StudyConfig, find_study
+from evolution.study.data import load_study
 from evolution.verify import verify
 
 ROOT = MODELS.parent

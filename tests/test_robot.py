@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from benchmarks.bridge import at_control_steps
-from epuck_mj.bridge.body import wrapped
-from epuck_mj.bridge.builds import BUILDS
-from epuck_mj.bridge.connection import Greeting
+from epuck_mj.bridge.drive.odometry import Odometry
+from epuck_mj.bridge.drive.robot import RealRobot
+from epuck_mj.bridge.drive.schedule import Schedule
+from epuck_mj.bridge.drive.session import Session
 from epuck_mj.bridge.errors import (
     BridgeError,
     LinkLost,
@@ -16,27 +17,25 @@ from epuck_mj.bridge.errors import (
     StaleReading,
     StillMoving,
 )
-from epuck_mj.bridge.fake.body import MujocoBody
+from epuck_mj.bridge.fake.builds import BUILDS
 from epuck_mj.bridge.fake.emulator import Emulator
+from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.reference import deviation, nominal, same_times
 from epuck_mj.bridge.fake.scenarios import Fault, random_scenario, scenario
 from epuck_mj.bridge.fake.virtual import VirtualPort, VirtualTime
-from epuck_mj.bridge.link import Link
-from epuck_mj.bridge.odometry import Odometry
-from epuck_mj.bridge.replies import Cycle, Proximity, Steps
-from epuck_mj.bridge.robot import RealRobot
-from epuck_mj.bridge.schedule import Schedule
-from epuck_mj.bridge.serial_line import SerialLine
-from epuck_mj.bridge.session import Session
-from epuck_mj.calibration import Calibration
+from epuck_mj.bridge.language.replies import Cycle, Proximity, Steps, wrapped
+from epuck_mj.bridge.line.connection import Greeting
+from epuck_mj.bridge.line.link import Link
+from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.constants import SPEED_MAX, TRACK, WHEEL_RADIUS, WHEEL_SPEED_MAX
-from epuck_mj.control import TaskParameters
-from epuck_mj.controller import Network
 from epuck_mj.errors import UserError
-from epuck_mj.model import load_scene
-from epuck_mj.motors import STEP_ANGLE, actual_rates
-from epuck_mj.sensors import sensed_distance
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.policies.network import Network
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.scene.model import load_scene
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.step.motors import STEP_ANGLE, actual_rates
+from epuck_mj.step.sensors import sensed_distance
 
 TASK = TaskParameters()
 CENTRE = np.zeros(3)

@@ -22,18 +22,20 @@ import yaml
 from matplotlib.image import imread
 from rerun.chunk import RrdReader
 
-from epuck_mj import controller_file, files
-from epuck_mj.calibration import Calibration
 from epuck_mj.errors import UserError
-from epuck_mj.mjcf import MODELS
-from epuck_mj.trajectory import Trajectory
-from evolution import champion, execution, results
-from evolution.config import ExperimentConfig
-from evolution.config_files import CONFIGS, find_config, load_config
-from evolution.experiment import HISTORY
-from evolution.held_out import Judge
-from evolution.run import run
-from evolution.run_directory import LOCK
+from epuck_mj.host import files
+from epuck_mj.policies import file as controller_file
+from epuck_mj.scene.mjcf import MODELS
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.trials.trajectory import Trajectory
+from evolution.judging import starts
+from evolution.judging.held_out import Judge
+from evolution.run import execution, results
+from evolution.run.__main__ import run
+from evolution.run.directory import LOCK
+from evolution.run.generation_loop import HISTORY
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.config_files import CONFIGS, find_config, load_config
 from tests.processes import python_process
 from tests.shipped import OPTIMIZERS
 
@@ -76,8 +78,8 @@ def evolution(cwd: Path, *argv: str, **variables) -> subprocess.CompletedProcess
 
 UNHURRIED = """
 import math, time
-from epuck_mj.command_line import main
-from evolution import execution, run_directory, run
+from epuck_mj.host.command_line import main
+from evolution.run import execution, directory as run_directory, __main__ as run
 
 class RunDirectory(run_directory.RunDirectory):
     def save(self, *arguments):
@@ -146,7 +148,7 @@ def every_generation_saved(monkeypatch):
 @pytest.fixture
 def quick(no_pictures, monkeypatch):
     """Few starts are held out too: for runs by the dozen."""
-    monkeypatch.setattr(champion, "N_VALIDATION", 5)
+    monkeypatch.setattr(starts, "N_VALIDATION", 5)
     test = Judge.test
     monkeypatch.setattr(Judge, "test", lambda self, policy: test(self, policy, 5))
 
@@ -830,8 +832,8 @@ def test_resume_from_another_directory(unfinished, finished, quick, monkeypatch)
 
 TWICE = """
 import signal, sys
-from epuck_mj.command_line import main
-from evolution import run
+from epuck_mj.host.command_line import main
+from evolution.run import __main__ as run
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from epuck_mj.constants import PROXIMITY_COUNT_MAX, PROXIMITY_COUNTS, PROXIMITY_RANGE
-from epuck_mj.sensors import observe, proximity
+from epuck_mj.step.sensors import observe, proximity
 
 
 def test_linear_from_contact_to_range():

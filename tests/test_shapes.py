@@ -3,8 +3,8 @@
 import mujoco
 import numpy as np
 
-from epuck_mj.geometry import arena_box, color, drawn
-from epuck_mj.recording import shapes
+from epuck_mj.scene.geometry import arena_box, color, drawn
+from epuck_mj.show.recording import shapes
 
 SHAPES = """
 <mujoco>

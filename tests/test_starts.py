@@ -7,8 +7,8 @@ import scipy.stats
 
 from epuck_mj.constants import BODY_RADIUS
 from epuck_mj.errors import UserError
-from epuck_mj.model import load_scene
-from epuck_mj.starts import FreeSpace
+from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.starts import FreeSpace
 
 CLEARANCE = 0.01
 

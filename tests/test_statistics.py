@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from evolution.comparisons import (
+from evolution.statistics.comparisons import (
     EXACT,
     a12,
     a12_interval,
@@ -19,14 +19,14 @@ from evolution.comparisons import (
     median_difference,
     stars,
 )
-from evolution.statistics import (
+from evolution.statistics.samples import (
     Interval,
     mean_interval,
     quartiles,
     wilson,
     worst_share_mean,
 )
-from evolution.targets import (
+from evolution.statistics.targets import (
     ecdf,
     evaluations_to_target,
     expected_running_time,

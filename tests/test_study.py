@@ -16,17 +16,19 @@ from pathlib import Path
 
 import pytest
 
-from epuck_mj import files
 from epuck_mj.errors import UserError
-from evolution import champion, execution, jobs, results
-from evolution import study as module
-from evolution.config_files import load_config
-from evolution.execution import Means
-from evolution.held_out import Judge
-from evolution.jobs import Event, Job, carry_out, failure_log, failure_of
-from evolution.run import run
-from evolution.run_directory import LOCK, RunDirectory
-from evolution.study import study
+from epuck_mj.host import files
+from evolution.judging import starts
+from evolution.judging.held_out import Judge
+from evolution.run import execution, results
+from evolution.run.__main__ import run
+from evolution.run.directory import LOCK, RunDirectory
+from evolution.run.execution import Means
+from evolution.settings.config_files import load_config
+from evolution.study import __main__ as module
+from evolution.study import jobs
+from evolution.study.__main__ import study
+from evolution.study.jobs import Event, Job, carry_out, failure_log, failure_of
 from tests.processes import python_process
 
 TIMEOUT = 120
@@ -49,9 +51,11 @@ LONG = 300
 
 UNHURRIED = """
 import math, time
-from epuck_mj.command_line import main
-from evolution import champion, execution, results, run_directory, study
-from evolution.held_out import Judge
+from epuck_mj.host.command_line import main
+from evolution.judging import starts
+from evolution.run import execution, results, directory as run_directory
+from evolution.study import __main__ as study
+from evolution.judging.held_out import Judge
 from tests.processes import python_process
 
 # in the processes of the runs as well, which import this file
@@ -61,7 +65,7 @@ def saved(self, *arguments):
     save(self, *arguments)
     time.sleep(0.05)
 
-champion.N_VALIDATION = 5
+starts.N_VALIDATION = 5
 Judge.test = lambda self, policy: test(self, policy, 5)
 results._draw_fitness = results._show = lambda *_: None
 execution.SAVING_SHARE = math.inf
@@ -94,7 +98,7 @@ def make_quick(patch: pytest.MonkeyPatch) -> None:
     """As in `UNHURRIED`, but without waiting."""
     test = Judge.test
     patch.setattr(Judge, "test", lambda self, policy: test(self, policy, 5))
-    patch.setattr(champion, "N_VALIDATION", 5)
+    patch.setattr(starts, "N_VALIDATION", 5)
     patch.setattr(results, "_draw_fitness", lambda *_: None)
     patch.setattr(results, "_show", lambda *_: None)
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 import yaml
 
-from epuck_mj import files
 from epuck_mj.errors import UserError
-from epuck_mj.mjcf import MODELS
-from evolution.config_files import find_config, load_config
-from evolution.run_directory import locked
-from evolution.study_config import StudyConfig, find_study, parse_seeds
-from evolution.study_directory import StudyDirectory
+from epuck_mj.host import files
+from epuck_mj.scene.mjcf import MODELS
+from evolution.run.directory import locked
+from evolution.settings.config_files import find_config, load_config
+from evolution.study.config import StudyConfig, find_study, parse_seeds
+from evolution.study.directory import StudyDirectory
 from tests.shipped import OPTIMIZERS
 
 SHIPPED = ("paper", "quick", "wheels")

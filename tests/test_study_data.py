@@ -8,7 +8,7 @@ import pytest
 
 from epuck_mj.errors import UserError
 from evolution.report.tables import provenance
-from evolution.study_data import load_study, read_history
+from evolution.study.data import load_study, read_history
 from tests.study_on_disk import write_study
 
 

@@ -7,9 +7,9 @@ from dm_env import specs
 
 import epuck_mj
 from epuck_mj import SUITE, UserError
-from epuck_mj.control import TaskParameters
-from epuck_mj.model import load_scene
-from epuck_mj.tasks import FollowWalls, environment
+from epuck_mj.environments.dm_control import FollowWalls, environment
+from epuck_mj.scene.model import load_scene
+from epuck_mj.step.control import TaskParameters
 
 TASKS = list(SUITE)
 SHORT = TaskParameters(steps=20)

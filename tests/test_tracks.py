@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from epuck_mj.control import TaskParameters, run_trials
-from epuck_mj.controller import Network
-from epuck_mj.simulation import SimulatedRobots
-from epuck_mj.starts import FreeSpace
-from epuck_mj.tracks import record_tracks
-from epuck_mj.trajectory import record
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.policies.network import Network
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.control import TaskParameters, run_trials
+from epuck_mj.trials.tracks import record_tracks
+from epuck_mj.trials.trajectory import record
 
 TASK = TaskParameters(steps=80)
 N = 12

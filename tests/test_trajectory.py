@@ -7,15 +7,15 @@ import zipfile
 import numpy as np
 import pytest
 
-from epuck_mj.control import TaskParameters, run_trials
-from epuck_mj.controller import Network
 from epuck_mj.errors import UserError
-from epuck_mj.model import load_scene
-from epuck_mj.motors import command
-from epuck_mj.sensors import observe, proximity
-from epuck_mj.simulation import SimulatedRobots
-from epuck_mj.trajectory import Trajectory, record
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.policies.network import Network
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.scene.model import load_scene
+from epuck_mj.step.control import TaskParameters, run_trials
+from epuck_mj.step.motors import command
+from epuck_mj.step.sensors import observe, proximity
+from epuck_mj.trials.trajectory import Trajectory, record
 
 TASK = TaskParameters(steps=60)
 STARTS = np.array([[0.0, 0.0, 0.0], [0.42, 0.1, 0.4], [-0.2, -0.44, 3.0]])
@@ -166,7 +166,10 @@ def test_other_arrays_are_refused(scene, tmp_path):
     name = np.array("epuck_mj.trajectory/2")
     for foreign, message in [
         (arrays, "expected format"),
-        (arrays | {"format": np.array("epuck_mj.trajectory/1")}, "expected format"),
+        (
+            arrays | {"format": np.array("epuck_mj.trajectory/1")},
+            "expected format",
+        ),
         ({"format": name, "time": arrays["time"]}, "missing"),
         (arrays | {"format": name, "more": name}, "more"),
         (arrays | {"format": name, "pose": arrays["pose"][:-1]}, "expected pose"),

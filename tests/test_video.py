@@ -9,10 +9,10 @@ import sys
 import numpy as np
 import pytest
 
-from epuck_mj.control import TaskParameters
 from epuck_mj.errors import UserError
-from epuck_mj.model import load_scene
-from epuck_mj.trajectory import record
+from epuck_mj.scene.model import load_scene
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.trials.trajectory import record
 
 TASK = TaskParameters(steps=20)
 SIZE = (160, 112)
@@ -36,7 +36,7 @@ def scene():
 
 def film(path, scene, trajectories, **named):
     pytest.importorskip("imageio_ffmpeg", reason="the extra 'video' is not installed")
-    from epuck_mj.video import save_video
+    from epuck_mj.show.video import save_video
 
     save_video(path, scene, trajectories, *SIZE, **named)
 
@@ -85,8 +85,8 @@ def test_a_video_that_cannot_be_written_is_one_line(scene, tmp_path):
 
 def test_without_the_extra_one_line_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    monkeypatch.delitem(sys.modules, "epuck_mj.video", raising=False)
+    monkeypatch.delitem(sys.modules, "epuck_mj.show.video", raising=False)
     with pytest.raises(UserError, match=r"pip install 'epuck-mj\[video\]'") as error:
-        importlib.import_module("epuck_mj.video")
+        importlib.import_module("epuck_mj.show.video")
     assert "\n" not in str(error.value)
     assert "imageio_ffmpeg" in str(error.value)

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from epuck_mj import view
-from epuck_mj.control import TaskParameters, drive
-from epuck_mj.controller import Network
-from epuck_mj.controller_file import ControllerFile, Origin
 from epuck_mj.errors import UserError
-from epuck_mj.mjcf import MODELS
-from epuck_mj.model import load_scene
-from epuck_mj.starts import FreeSpace
-from epuck_mj.trajectory import record
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.policies.file import ControllerFile, Origin
+from epuck_mj.policies.network import Network
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.scene.mjcf import MODELS
+from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.control import TaskParameters, drive
+from epuck_mj.trials.trajectory import record
 
 TASK = TaskParameters(steps=120)
 
@@ -182,7 +182,7 @@ def display():
 WINDOW = """
 import sys
 from epuck_mj import view
-from epuck_mj.command_line import main
+from epuck_mj.host.command_line import main
 
 open_window = view.open_window
 def closing(model, data):

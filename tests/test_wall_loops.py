@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from epuck_mj.clearance import ClearanceProbe
 from epuck_mj.constants import BODY_RADIUS, PROXIMITY_RANGE
 from epuck_mj.errors import UserError
-from epuck_mj.model import load_scene
-from epuck_mj.wall_loops import (
+from epuck_mj.scene.clearance import ClearanceProbe
+from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.wall_loops import (
     ABSENCE_MAX,
     LOOP_CLEARANCE,
     WallLoops,

@@ -8,18 +8,18 @@ from pathlib import Path
 
 import tyro
 
-from epuck_mj.bridge.connect import connect
-from epuck_mj.bridge.log import log_name
-from epuck_mj.bridge.mission import Mission, accomplish
-from epuck_mj.bridge.serial_port import ports
-from epuck_mj.calibration import Calibration
-from epuck_mj.command_line import main, parse
+from epuck_mj.bridge.drive.log import log_name
+from epuck_mj.bridge.drive.mission import Mission, accomplish
+from epuck_mj.bridge.line.connect import connect
+from epuck_mj.bridge.line.serial_port import ports
 from epuck_mj.constants import SPEED_MAX
-from epuck_mj.control import Policy, TaskParameters
-from epuck_mj.controller_file import load
 from epuck_mj.errors import UserError
-from epuck_mj.model import load_scene
-from epuck_mj.wall_follower import YARDSTICK, WallFollower
+from epuck_mj.host.command_line import main, parse
+from epuck_mj.policies.file import load
+from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
+from epuck_mj.scene.model import load_scene
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.control import Policy, TaskParameters
 
 MODULE = "epuck_mj.bridge"
 SECONDS_MAX = 24 * 3600

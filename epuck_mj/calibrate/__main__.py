@@ -7,17 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from epuck_mj.bridge.connect import connect
-from epuck_mj.bridge.connection import Clock, Connection
+from epuck_mj.bridge.drive.mission import DONE, FAILED, RUNAWAY
 from epuck_mj.bridge.errors import BridgeError, StillMoving
-from epuck_mj.bridge.mission import DONE, FAILED, RUNAWAY
+from epuck_mj.bridge.line.connect import connect
+from epuck_mj.bridge.line.connection import Clock, Connection
 from epuck_mj.calibrate.guide import STEPS, Person
 from epuck_mj.calibrate.measure import Bench
-from epuck_mj.calibration import Calibration
-from epuck_mj.command_line import main, parse
 from epuck_mj.errors import UserError
-from epuck_mj.files import check_writable, is_file
-from epuck_mj.interruption import Interrupted, Interruption
+from epuck_mj.host.command_line import main, parse
+from epuck_mj.host.files import check_writable, is_file
+from epuck_mj.host.interruption import Interrupted, Interruption
+from epuck_mj.step.calibration import Calibration
 
 MODULE = "epuck_mj.calibrate"
 

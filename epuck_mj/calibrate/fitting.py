@@ -11,8 +11,8 @@ import numpy as np
 
 from epuck_mj.constants import BODY_RADIUS
 from epuck_mj.errors import UserError
-from epuck_mj.motors import STEP_ANGLE
-from epuck_mj.sensors import proximity
+from epuck_mj.step.motors import STEP_ANGLE
+from epuck_mj.step.sensors import proximity
 
 RADII = (0.015, 0.025)
 TRACKS = (0.045, 0.065)

@@ -18,11 +18,11 @@ from epuck_mj.calibrate.fitting import (
     peaks,
 )
 from epuck_mj.calibrate.measure import Bench
-from epuck_mj.calibration import Calibration
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
-from epuck_mj.interruption import Interruption
-from epuck_mj.motors import STEP_ANGLE
+from epuck_mj.host.interruption import Interruption
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.motors import STEP_ANGLE
 
 CLEARANCES = (0.010, 0.020, 0.030)
 """Between shell and wall [m]: where sensors are good, and do not saturate."""

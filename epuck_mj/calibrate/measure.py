@@ -12,13 +12,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from epuck_mj.bridge.connection import Clock, Connection
+from epuck_mj.bridge.drive.robot import RealRobot
 from epuck_mj.bridge.errors import BridgeError, StillMoving
-from epuck_mj.bridge.robot import RealRobot
-from epuck_mj.calibration import Calibration
+from epuck_mj.bridge.line.connection import Clock, Connection
 from epuck_mj.errors import UserError
-from epuck_mj.interruption import Interruption
-from epuck_mj.motors import STEP_ANGLE
+from epuck_mj.host.interruption import Interruption
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.motors import STEP_ANGLE
 
 T = TypeVar("T")
 

@@ -18,9 +18,9 @@ from epuck_mj.check.source import TOPIC, Source, compiled, read
 from epuck_mj.check.speed import speed_findings
 from epuck_mj.check.walls import finite_findings, plane_findings, wall_findings
 from epuck_mj.errors import UserError
-from epuck_mj.mjcf import find_arena, find_robot
-from epuck_mj.model import Scene, load_scene
-from epuck_mj.starts import START_CLEARANCE, FreeSpace, Grid, survey
+from epuck_mj.scene.mjcf import find_arena, find_robot
+from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.starts import START_CLEARANCE, FreeSpace, Grid, survey
 
 SUBSTEPS_MAX = 10_000
 """Most physics steps in a control step: nobody would wait for more."""

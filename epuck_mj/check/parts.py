@@ -5,7 +5,7 @@ import numpy as np
 
 from epuck_mj.check.findings import Finding, info
 from epuck_mj.constants import PROXIMITY_RANGE
-from epuck_mj.model import Scene
+from epuck_mj.scene.model import Scene
 
 _SENSOR = mujoco.mjtSensor
 

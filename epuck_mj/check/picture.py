@@ -6,10 +6,10 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from epuck_mj.colors import GREEN, ORANGE, fraction
-from epuck_mj.model import Scene
-from epuck_mj.outline import shell_outline, wall_outlines
-from epuck_mj.starts import Grid
+from epuck_mj.scene.model import Scene
+from epuck_mj.scene.outline import shell_outline, wall_outlines
+from epuck_mj.scene.starts import Grid
+from epuck_mj.show.colors import GREEN, ORANGE, fraction
 
 WALL = "0.45"
 

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 
 from epuck_mj.check.findings import Finding, Place, error, info, warning
-from epuck_mj.interface import ROBOT_BODY
-from epuck_mj.model import Scene
+from epuck_mj.scene.model import Scene
+from epuck_mj.scene.robot_parts import ROBOT_BODY
 
 SETTLING = 1.0
 """How long a robot is left alone [s]."""

@@ -6,11 +6,11 @@ import numpy as np
 from scipy import ndimage
 
 from epuck_mj.check.findings import Finding, Place, error, info, warning
-from epuck_mj.clearance import CLEARANCE_MAX, ClearanceProbe
 from epuck_mj.errors import UserError
-from epuck_mj.model import Scene
-from epuck_mj.outline import shell_outline
-from epuck_mj.starts import START_CLEARANCE, FreeSpace, Grid, enclosed
+from epuck_mj.scene.clearance import CLEARANCE_MAX, ClearanceProbe
+from epuck_mj.scene.model import Scene
+from epuck_mj.scene.outline import shell_outline
+from epuck_mj.scene.starts import START_CLEARANCE, FreeSpace, Grid, enclosed
 
 TOPIC = "room"
 SAMPLE = 64

@@ -15,9 +15,9 @@ import mujoco
 
 from epuck_mj.check.findings import Place, Unusable, error
 from epuck_mj.errors import UserError
-from epuck_mj.files import is_file, read_text
-from epuck_mj.interface import ROBOT_BODY
-from epuck_mj.mjcf import SHIPPED_ROBOTS, SceneText, find_assets, with_robot
+from epuck_mj.host.files import is_file, read_text
+from epuck_mj.scene.mjcf import SHIPPED_ROBOTS, SceneText, find_assets, with_robot
+from epuck_mj.scene.robot_parts import ROBOT_BODY
 
 TOPIC = "file"
 

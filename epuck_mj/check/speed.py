@@ -7,11 +7,11 @@ import mujoco
 import numpy as np
 
 from epuck_mj.check.findings import Finding, Place, info, warning
-from epuck_mj.control import ControlStep, TaskParameters, drive
-from epuck_mj.interface import TIMESTEP
-from epuck_mj.model import Scene
-from epuck_mj.simulation import SimulatedRobots
-from epuck_mj.wall_follower import WallFollower
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.scene.model import Scene
+from epuck_mj.scene.robot_parts import TIMESTEP
+from epuck_mj.step.control import ControlStep, TaskParameters, drive
 
 MEASURED = 0.15
 """Duration of each of the two measurements [s]."""

@@ -12,12 +12,12 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from epuck_mj.check.findings import Finding, Place, error, info, warning
-from epuck_mj.clearance import CONVEX
 from epuck_mj.constants import PROXIMITY_RANGE
-from epuck_mj.geometry import at_rest, box_around, kinematics, mesh, walls
-from epuck_mj.interface import ROBOT_BODY, SHELL, can_touch, static
-from epuck_mj.model import Scene
-from epuck_mj.starts import START_CLEARANCE
+from epuck_mj.scene.clearance import CONVEX
+from epuck_mj.scene.geometry import at_rest, box_around, kinematics, mesh, walls
+from epuck_mj.scene.model import Scene
+from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL, can_touch, static
+from epuck_mj.scene.starts import START_CLEARANCE
 
 TOPIC = "walls"
 NAMES_MAX = 6

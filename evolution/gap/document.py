@@ -13,7 +13,7 @@ from evolution.gap.transfer import (
     rank_correlations,
     verdict,
 )
-from evolution.report.blocks import Block, Heading, Listing, Paragraph, Table
+from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
 
 COLUMNS = (
     "experiment",

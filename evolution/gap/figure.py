@@ -6,10 +6,10 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from epuck_mj.colors import TRIALS, fraction
+from epuck_mj.show.colors import TRIALS, fraction
 from evolution.gap.transfer import SHARE_KEPT, Transfer
-from evolution.report.figures.style import PAGE, PRINT
-from evolution.report.words import robot_name
+from evolution.pages.style import PAGE, PRINT
+from evolution.pages.words import robot_name
 
 LINES = ("-", (0, (7, 2)), (0, (2, 1.5)), (0, (7, 1.5, 1.2, 1.5)))
 

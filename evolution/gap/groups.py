@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from evolution.named_policies import NamedPolicy
-from evolution.study_directory import PREFIX
+from evolution.study.directory import PREFIX
 
 
 def experiments(policies: Sequence[NamedPolicy]) -> dict[str, list[int]]:

@@ -4,13 +4,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
-from epuck_mj.model import Scene, load_scene
-from epuck_mj.simulation import SimulatedRobots
-from epuck_mj.starts import FreeSpace
-from epuck_mj.tracks import Tracks, record_tracks
-from evolution.champion import starts_for_test
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.trials.tracks import Tracks, record_tracks
 from evolution.gap.worlds import World, met
-from evolution.held_out import Everybody
+from evolution.judging.held_out import Everybody
+from evolution.judging.starts import starts_for_test
 from evolution.named_policies import NamedPolicy
 
 

@@ -7,7 +7,12 @@ import numpy as np
 from scipy import stats
 
 from evolution.gap.measure import Outcome
-from evolution.statistics import Interval, mean_interval, rank_correlation, wilson
+from evolution.statistics.samples import (
+    Interval,
+    mean_interval,
+    rank_correlation,
+    wilson,
+)
 
 SHARE_KEPT = 0.8
 """Least share of its fitness that a policy keeps in a world it masters."""

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from epuck_mj import disturbances
 from epuck_mj.constants import (
     N_PROXIMITY,
     N_WHEELS,
@@ -13,8 +12,9 @@ from epuck_mj.constants import (
     TRACK,
     WHEEL_RADIUS,
 )
-from epuck_mj.disturbances import Disturbances
-from evolution.experiment import random_generator
+from epuck_mj.step import disturbances
+from epuck_mj.step.disturbances import Disturbances
+from evolution.settings.randomness import random_generator
 
 WORLD_SEED = 0
 """Of the worlds: the same for every champion and every study."""

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from epuck_mj.control import TaskParameters
 from epuck_mj.errors import UserError
-from epuck_mj.model import Scene
-from epuck_mj.recording import Trial
-from epuck_mj.starts import FreeSpace
-from epuck_mj.trajectory import Trajectory, record
-from evolution.champion import (
+from epuck_mj.scene.model import Scene
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.show.recording import Trial
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.trials.trajectory import Trajectory, record
+from evolution.judging.starts import (
     N_TEST,
     N_VALIDATION,
     starts_for_test,

@@ -12,8 +12,8 @@ import time
 import urllib.request
 from pathlib import Path
 
-from epuck_mj import files
 from epuck_mj.errors import UserError
+from epuck_mj.host import files
 from evolution.replay.viewer import viewer_binary
 
 LOOPBACK = "127.0.0.1"

@@ -2,8 +2,15 @@
 
 from collections.abc import Sequence
 
-from evolution.comparisons import FEWEST_FOR_STARS, LEVELS
-from evolution.report.blocks import Block, Heading, Listing, Paragraph, Table
+from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
+from evolution.pages.words import (
+    YARDSTICK_LABEL,
+    between,
+    evaluations,
+    label,
+    probability,
+    robot_name,
+)
 from evolution.report.pairs import PairRow, compared, pair_rows
 from evolution.report.samples import FOLLOWING
 from evolution.report.successes import FOLLOWS, MATCHES, SuccessRow, success_rows
@@ -13,16 +20,9 @@ from evolution.report.tables import (
     shown_robots,
     target_rows,
 )
-from evolution.report.words import (
-    YARDSTICK_LABEL,
-    between,
-    evaluations,
-    label,
-    probability,
-    robot_name,
-)
-from evolution.statistics import FEWEST_FOR_INTERVAL
-from evolution.study_data import StudyData
+from evolution.statistics.comparisons import FEWEST_FOR_STARS, LEVELS
+from evolution.statistics.samples import FEWEST_FOR_INTERVAL
+from evolution.study.data import StudyData
 
 
 def comparisons(data: StudyData) -> list[Block]:

@@ -2,9 +2,18 @@
 
 import numpy as np
 
-from epuck_mj.behaviour_classes import HUG, MEANINGS
-from epuck_mj.metrics import FOLLOWING_SHARE
-from evolution.report.blocks import Block, Heading, Listing, Paragraph, Table
+from epuck_mj.trials.behaviour_classes import HUG, MEANINGS
+from epuck_mj.trials.metrics import FOLLOWING_SHARE
+from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
+from evolution.pages.words import (
+    NOTHING,
+    SPREAD,
+    YARDSTICK_LABEL,
+    label,
+    percent,
+    robot_name,
+    spread,
+)
 from evolution.report.samples import (
     class_means,
     clearance,
@@ -19,17 +28,8 @@ from evolution.report.samples import (
     whole_laps,
 )
 from evolution.report.tables import shown_robots
-from evolution.report.words import (
-    NOTHING,
-    SPREAD,
-    YARDSTICK_LABEL,
-    label,
-    percent,
-    robot_name,
-    spread,
-)
-from evolution.statistics import FEWEST_FOR_RANKS, rank_correlation
-from evolution.study_data import StudyData
+from evolution.statistics.samples import FEWEST_FOR_RANKS, rank_correlation
+from evolution.study.data import StudyData
 
 
 def held_out_fitness(data: StudyData) -> list[Block]:

@@ -2,18 +2,15 @@
 
 import numpy as np
 
-from evolution.champion import BEST_OF_POPULATION, LATEST_BEST, N_VALIDATION
-from evolution.report.blocks import Block, Code, Heading, Listing, Paragraph, Table
+from evolution.judging.starts import N_VALIDATION
+from evolution.pages.blocks import Block, Code, Heading, Listing, Paragraph, Table
+from evolution.pages.words import NOTHING, evaluations, label, robot_name, spread
 from evolution.report.samples import tests_of
 from evolution.report.summary import commands, config_differences
-from evolution.report.tables import (
-    control_steps,
-    provenance,
-    shown_robots,
-)
-from evolution.report.words import NOTHING, evaluations, label, robot_name, spread
-from evolution.study_config import seeds_text
-from evolution.study_data import StudyData
+from evolution.report.tables import control_steps, provenance, shown_robots
+from evolution.run.champion import BEST_OF_POPULATION, LATEST_BEST
+from evolution.study.config import seeds_text
+from evolution.study.data import StudyData
 
 
 def what_was_run(data: StudyData) -> list[Block]:

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from epuck_mj.files import write_text
-from evolution.report.words import label
-from evolution.study_data import RunData, StudyData
+from epuck_mj.host.files import write_text
+from evolution.pages.words import label
+from evolution.study.data import RunData, StudyData
 
 FUNCTION_ID, FUNCTION = 1, "WallFollowing"
 

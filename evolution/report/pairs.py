@@ -11,7 +11,9 @@ from itertools import combinations
 
 import numpy as np
 
-from evolution.comparisons import (
+from evolution.pages.words import between, probability
+from evolution.report.tables import generator, measures
+from evolution.statistics.comparisons import (
     FEWEST_FOR_STARS,
     LEVELS,
     a12_interval,
@@ -20,10 +22,8 @@ from evolution.comparisons import (
     median_difference,
     stars,
 )
-from evolution.report.tables import generator, measures
-from evolution.report.words import between, probability
-from evolution.statistics import FEWEST_FOR_INTERVAL, Interval
-from evolution.study_data import StudyData
+from evolution.statistics.samples import FEWEST_FOR_INTERVAL, Interval
+from evolution.study.data import StudyData
 
 
 @dataclass(frozen=True)

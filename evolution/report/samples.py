@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from evolution.study_data import RunData, StudyData
-from evolution.targets import evaluations_to_target
+from evolution.statistics.targets import evaluations_to_target
+from evolution.study.data import RunData, StudyData
 
 FOLLOWING = 0.9
 """Least share of a champion's trials that follow a wall without crashing."""

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from evolution.comparisons import FEWEST_FOR_STARS, LEVELS, fisher, holm
 from evolution.report.samples import FOLLOWING, following_share
 from evolution.report.tables import shown_robots
-from evolution.statistics import wilson
-from evolution.study_data import RunData, StudyData
+from evolution.statistics.comparisons import FEWEST_FOR_STARS, LEVELS, fisher, holm
+from evolution.statistics.samples import wilson
+from evolution.study.data import RunData, StudyData
 
 MATCHES, FOLLOWS = "matches the hand-written follower", "follows walls"
 """Criteria of success.

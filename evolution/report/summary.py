@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from epuck_mj.behaviour_classes import HUG
-from epuck_mj.wall_follower import YARDSTICK
-from evolution.config import ExperimentConfig, flat
+from epuck_mj.policies.wall_follower import YARDSTICK
+from epuck_mj.trials.behaviour_classes import HUG
+from evolution.pages.words import command_line, label
 from evolution.report.pairs import pair_rows
 from evolution.report.samples import (
     class_means,
@@ -22,16 +22,11 @@ from evolution.report.samples import (
     tests_of,
 )
 from evolution.report.successes import success_rows
-from evolution.report.tables import (
-    provenance,
-    run_rows,
-    shown_robots,
-    target_rows,
-)
-from evolution.report.words import command_line, label
-from evolution.run_directory import RunDirectory
-from evolution.statistics import quartiles, rank_correlation
-from evolution.study_data import StudyData
+from evolution.report.tables import provenance, run_rows, shown_robots, target_rows
+from evolution.run.directory import RunDirectory
+from evolution.settings.config import ExperimentConfig, flat
+from evolution.statistics.samples import quartiles, rank_correlation
+from evolution.study.data import StudyData
 
 
 def config_differences(data: StudyData) -> dict[str, dict[str, Any]]:

@@ -1,17 +1,15 @@
 """The tables of a report: what each run found, and what each target cost."""
 
 import csv
-import io
 import shlex
-from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from epuck_mj.errors import UserError
-from evolution.held_out import WHEELED_ROBOT
+from evolution.judging.held_out import WHEELED_ROBOT
 from evolution.report.samples import (
     TARGET_SHARES,
     clearance,
@@ -19,9 +17,9 @@ from evolution.report.samples import (
     hits,
     whole_lap_share,
 )
-from evolution.run_directory import RunDirectory
-from evolution.study_data import RunData, StudyData
-from evolution.targets import expected_running_time_interval
+from evolution.run.directory import RunDirectory
+from evolution.statistics.targets import expected_running_time_interval
+from evolution.study.data import RunData, StudyData
 
 BOOTSTRAP_SEED = 0
 """Of the resamples of each interval, so that none depends on the rows before it."""
@@ -166,20 +164,6 @@ def target_rows(data: StudyData) -> list[TargetRow]:
                 )
             )
     return rows
-
-
-def csv_text(columns: Sequence[str], rows: Iterable[Any]) -> str:
-    """The text of a CSV file with exact floats; None is an empty cell.
-
-    Args:
-        columns: names, in order.
-        rows: mappings or dataclasses.
-    """
-    text = io.StringIO()
-    writer = csv.DictWriter(text, columns, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(row if isinstance(row, dict) else asdict(row) for row in rows)
-    return text.getvalue()
 
 
 def provenance(data: StudyData) -> dict[str, list[Any]]:

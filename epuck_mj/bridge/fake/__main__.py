@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from epuck_mj.bridge.fake.body import MujocoBody
 from epuck_mj.bridge.fake.emulator import WIFI, Emulator
 from epuck_mj.bridge.fake.endpoints import Endpoint, Pty, Tcp, serve
+from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import random_scenario, scenario
-from epuck_mj.command_line import main, parse
 from epuck_mj.errors import UserError
-from epuck_mj.files import check_writable
-from epuck_mj.interruption import Interrupted, Interruption
-from epuck_mj.model import load_scene
+from epuck_mj.host.command_line import main, parse
+from epuck_mj.host.files import check_writable
+from epuck_mj.host.interruption import Interrupted, Interruption
+from epuck_mj.scene.model import load_scene
 
 MODULE = "epuck_mj.bridge.fake"
 RANDOM = "random"

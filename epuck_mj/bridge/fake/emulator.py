@@ -5,12 +5,12 @@ from typing import Protocol
 
 import numpy as np
 
-from epuck_mj.bridge.builds import BUILDS
-from epuck_mj.bridge.fake.body import MujocoBody
+from epuck_mj.bridge.fake.builds import BUILDS
+from epuck_mj.bridge.fake.firmware import Firmware
+from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import GARBAGE_MAX, LOSS, Fault
-from epuck_mj.bridge.firmware import Firmware
-from epuck_mj.bridge.wifi_firmware import WifiFirmware
-from epuck_mj.bridge.wire import Wire
+from epuck_mj.bridge.fake.wifi_firmware import WifiFirmware
+from epuck_mj.bridge.fake.wire import Wire
 from epuck_mj.constants import BYTE_TIME
 from epuck_mj.errors import UserError
 

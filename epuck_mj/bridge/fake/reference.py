@@ -12,15 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from epuck_mj.bridge.body import MotorTimer, Wheel
-from epuck_mj.bridge.fake.body import Journal
-from epuck_mj.control import Policy, TaskParameters, control_step
-from epuck_mj.disturbances import Noise, draw
-from epuck_mj.disturbed_robots import DisturbedRobots
-from epuck_mj.model import Scene
-from epuck_mj.motors import STEP_ANGLE, command, step_rates
-from epuck_mj.sensors import observe, proximity, sensed_distance
-from epuck_mj.simulation import SimulatedRobots
+from epuck_mj.bridge.fake.motors_and_sensors import MotorTimer, Wheel
+from epuck_mj.bridge.fake.mujoco_body import Journal
+from epuck_mj.rungs.disturbed import DisturbedRobots
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.scene.model import Scene
+from epuck_mj.step.control import Policy, TaskParameters, control_step
+from epuck_mj.step.disturbances import Noise, draw
+from epuck_mj.step.motors import STEP_ANGLE, command, step_rates
+from epuck_mj.step.sensors import observe, proximity, sensed_distance
 
 QUIET = Noise(counts=0.0, wheels=0.0, age=0.0)
 """Whole counts and whole steps, and nothing else."""

@@ -10,16 +10,15 @@ from matplotlib.collections import LineCollection, QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from epuck_mj import colors
-from epuck_mj.colors import fraction
-from epuck_mj.model import load_scene
-from epuck_mj.starts import FreeSpace
-from epuck_mj.trajectory import record
-from evolution.champion import starts_for_test
-from evolution.config import ExperimentConfig
-from evolution.figures import trajectory_figure
-from evolution.held_out import WHEELED_ROBOT
-from evolution.report.figures.style import (
+from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.show import colors
+from epuck_mj.show.colors import fraction
+from epuck_mj.show.figures import trajectory_figure
+from epuck_mj.trials.trajectory import record
+from evolution.judging.held_out import WHEELED_ROBOT
+from evolution.judging.starts import starts_for_test
+from evolution.pages.style import (
     PAGE,
     PRINT,
     Color,
@@ -27,9 +26,10 @@ from evolution.report.figures.style import (
     legend_below,
     robot_panels,
 )
+from evolution.pages.words import PAPERS, YARDSTICK_LABEL, label
 from evolution.report.samples import class_means
-from evolution.report.words import PAPERS, YARDSTICK_LABEL, label
-from evolution.study_data import RunData, StudyData
+from evolution.settings.config import ExperimentConfig
+from evolution.study.data import RunData, StudyData
 
 N_STARTS = 2
 """Trials shown of each champion."""

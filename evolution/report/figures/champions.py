@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from evolution.report.figures.style import (
+from evolution.pages.style import (
     COLUMN,
     PAGE,
     PRINT,
@@ -21,10 +21,10 @@ from evolution.report.figures.style import (
     looks,
     robot_panels,
 )
+from evolution.pages.words import YARDSTICK_LABEL, robot_name
 from evolution.report.samples import disturbed
-from evolution.report.words import YARDSTICK_LABEL, robot_name
-from evolution.statistics import quartiles
-from evolution.study_data import StudyData
+from evolution.statistics.samples import quartiles
+from evolution.study.data import StudyData
 
 MOST_COLUMNS = 3
 """Panels side by side."""

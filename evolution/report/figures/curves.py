@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from evolution.report.figures.style import (
+from evolution.pages.style import (
     COLUMN,
     PRINT,
     YARDSTICK_LOOK,
@@ -20,10 +20,10 @@ from evolution.report.figures.style import (
     legend_below,
     looks,
 )
+from evolution.pages.words import YARDSTICK_LABEL, label, robot_name
 from evolution.report.samples import TARGET_SHARES, hits
-from evolution.report.words import YARDSTICK_LABEL, label, robot_name
-from evolution.study_data import RunData, StudyData
-from evolution.targets import ecdf
+from evolution.statistics.targets import ecdf
+from evolution.study.data import RunData, StudyData
 
 N_POINTS = 150
 """Most points of a curve: more than print shows, few enough for small files."""

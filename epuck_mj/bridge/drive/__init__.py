@@ -1,0 +1,1 @@
+"""Drives a real robot: sensing, policy, speeds, schedule and log."""

@@ -1,0 +1,173 @@
+"""One drive of a real robot, from the first word to the log."""
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from epuck_mj.bridge.drive.keyboard import Keyboard, keyboard
+from epuck_mj.bridge.drive.log import save_log
+from epuck_mj.bridge.drive.report import HEADING, live_line, summary
+from epuck_mj.bridge.drive.robot import RealRobot
+from epuck_mj.bridge.drive.session import Session
+from epuck_mj.bridge.errors import BridgeError, StillMoving
+from epuck_mj.bridge.line.connection import Connection
+from epuck_mj.errors import UserError
+from epuck_mj.host.interruption import Interrupted, Interruption
+from epuck_mj.scene.model import Scene
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.control import Policy, TaskParameters
+
+DONE, FAILED, RUNAWAY = 0, 3, 4
+"""Exit statuses: as planned; broken off, standing still; perhaps still moving.
+
+Beside 2 for what a user can put right before it starts, and 128 + signal.
+"""
+
+QUIET_PERIOD = 1.0
+"""Time between two lines where they are not read on a terminal [s]."""
+
+
+@dataclass(frozen=True)
+class Mission:
+    """What a robot has to do.
+
+    Attributes:
+        policy: that drives it.
+        task: control step, speeds, fitness.
+        scene: to show the log in.
+        calibration: in what the robot differs from the robot of the books.
+        n_steps: control steps.
+        start: pose: x, y [m], yaw [rad].
+        speed_max: no wheel rolls faster than this [m/s].
+        dry_run: whether it stands still.
+        calibrate: whether its sensors are zeroed first.
+        log: name of the log files without their endings.
+    """
+
+    policy: Policy
+    task: TaskParameters
+    scene: Scene
+    calibration: Calibration
+    n_steps: int
+    start: tuple[float, float, float]
+    speed_max: float
+    dry_run: bool
+    calibrate: bool
+    log: Path
+
+
+def accomplish(
+    mission: Mission,
+    connect: Callable[[], Connection],
+    clock: Callable[[], float] = time.monotonic,
+) -> int:
+    """Drive, stop, write the log; the exit status.
+
+    Args:
+        mission: what to do.
+        connect: opens the way to the robot.
+        clock: what the connection tells times by.
+
+    Raises:
+        UserError: if it never began.
+    """
+    session = Session(mission.task)
+    with Interruption() as interruption, keyboard() as keys:
+        robot, status, word = None, DONE, ""
+        try:
+            with interruption.raising():
+                connection = connect()
+            robot = RealRobot(
+                connection,
+                mission.calibration,
+                mission.task.control_step,
+                mission.speed_max,
+                mission.dry_run,
+                mission.start,
+                clock,
+            )
+            # however the inner block ends, the outer one stops the robot
+            with robot, interruption.raising():
+                word = _drive(mission, robot, session, keys, clock)
+        except Interrupted:
+            word = "interrupted"
+        except StillMoving as error:
+            status, word = RUNAWAY, _runaway(error)
+        except BridgeError as error:
+            if session.start is None:
+                raise
+            status, word = FAILED, f"error: {error}; the robot stands still"
+        finally:
+            facts, failure = _save(mission, session, robot)
+        if interruption.signum is not None and status != RUNAWAY:
+            status = interruption.status
+            still = "the robot stands still" if robot and robot.met else "never began"
+            word = f"{interruption.signum.name}: ended, {still}"
+        # nobody may be there to read the rest
+        if status:
+            print(word, file=sys.stderr, flush=True)
+        print(facts, flush=True)
+        if not status:
+            print(word, flush=True)
+    if failure is not None and not status:
+        raise failure
+    if failure is not None:
+        print(f"error: {failure}", file=sys.stderr)
+    return status
+
+
+def _drive(
+    mission: Mission,
+    robot: RealRobot,
+    session: Session,
+    keys: Keyboard,
+    clock: Callable[[], float],
+) -> str:
+    """Why it ended as planned."""
+    greeting = robot.greet()
+    print(f"{greeting.firmware}; battery {greeting.battery}", flush=True)
+    if mission.calibrate:
+        print("calibration: keep 20 cm around the robot clear of everything")
+        print("it takes up to 3 seconds ...", flush=True)
+        robot.calibrate()
+        print("calibrated", flush=True)
+    print(f"{'DRY RUN, it stands still. ' if mission.dry_run else ''}", end="")
+    print(f"{'q or space stops. ' if keys.there else ''}Ctrl-C stops.\n{HEADING}")
+    live = sys.stdout.isatty()
+    every = 1 if live else max(1, round(QUIET_PERIOD / mission.task.control_step))
+    try:
+        for step in session.drive(robot, mission.policy, mission.n_steps, clock):
+            if step.number % every == 0:
+                line = live_line(step, robot)
+                start, end = ("\r", "") if live else ("", "\n")
+                print(f"{start}{line}", end=end, flush=True)
+            if keys.stop_wanted():
+                return "stopped by the operator's key; the robot stands still"
+    finally:
+        if live:
+            print(flush=True)
+    return "ended; the robot stands still"
+
+
+def _save(
+    mission: Mission, session: Session, robot: RealRobot | None
+) -> tuple[str, UserError | None]:
+    """Write the log; what to say of it all, and what went wrong with the log."""
+    if robot is None or session.start is None:
+        return "", None
+    facts = summary(session, robot)
+    text = f"# A real robot\n\n```\n{facts}\n```\n"
+    try:
+        files = save_log(mission.log, session, mission.policy, mission.scene, text)
+    except UserError as error:
+        return f"\n{facts}", error
+    return f"\n{facts}\nlog            {', '.join(map(str, files))}", None
+
+
+def _runaway(error: StillMoving) -> str:
+    """What a person has to know who may have to run after a robot."""
+    cause = error.__context__
+    before = f"; at first: {cause}" if isinstance(cause, BridgeError) else ""
+    return f"error: THE MOTORS MAY STILL TURN, switch the robot off: {error}{before}"

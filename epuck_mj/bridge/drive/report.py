@@ -1,0 +1,46 @@
+"""What a bridge tells its operator: a line that lives, and a summary."""
+
+import numpy as np
+
+from epuck_mj.bridge.drive.robot import RealRobot
+from epuck_mj.bridge.drive.session import Session, Step
+
+
+def live_line(step: Step, robot: RealRobot) -> str:
+    """A control step in less than 80 characters: counts, speeds, timing.
+
+    Speeds are those sent; of a dry run, those that would have been.
+    """
+    counts = " ".join(f"{count:4.0f}" for count in step.moment.proximity)
+    left, right = robot.told(step.control.command)
+    return (
+        f"{step.moment.time:5.1f} s ps {counts} D {left:5d} {right:5d} "
+        f"{step.moment.latency * 1000:3.0f} ms {robot.schedule.n_overruns} over"
+    )
+
+
+HEADING = (
+    " time    proximity counts ps0 to ps7              wheels steps/s  "
+    "latency, overruns"
+)
+
+
+def summary(session: Session, robot: RealRobot) -> str:
+    """What a session came to, a fact a line."""
+    steps = session.steps
+    fitness = sum(float(step.control.fitness) for step in steps)
+    lines = [
+        f"control steps  {len(steps)}, {robot.schedule.n_overruns} overruns, "
+        f"{robot.n_repairs} resynchronisations"
+    ]
+    if steps:
+        latency = 1000 * np.array([step.moment.latency for step in steps])
+        compute = 1000 * np.array([step.compute for step in steps])
+        lines += [
+            f"latency        median {np.median(latency):.1f} ms, 95 % "
+            f"{np.percentile(latency, 95):.1f} ms, longest {latency.max():.1f} ms",
+            f"compute        95 % {np.percentile(compute, 95):.2f} ms a step",
+            f"odometry       {robot.odometry.length:.3f} m",
+            f"fitness        {fitness:.1f} of {len(steps)}, estimated",
+        ]
+    return "\n".join(lines)

@@ -1,0 +1,207 @@
+"""A real robot as `control.Robot`: what drives the simulated one drives this one."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from epuck_mj.bridge.drive.odometry import Odometry
+from epuck_mj.bridge.drive.schedule import Schedule
+from epuck_mj.bridge.errors import (
+    BridgeError,
+    LinkLost,
+    RobotRestarted,
+    StaleReading,
+)
+from epuck_mj.bridge.line.connection import Connection, Greeting
+from epuck_mj.constants import READING_AGE_MAX
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.motors import STEP_ANGLE, step_rates
+from epuck_mj.step.sensors import Reading, sensed_distance
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a robot reported at the end of a control step, beside its reading.
+
+    Attributes:
+        time: when it came, since the robot started [s].
+        proximity: counts ps0..ps7, `(8,)`.
+        pose: by odometry, `(3,)`: x, y [m], yaw [rad].
+        rates: that it was told to drive at [steps/s], left and right, `(2,)`.
+        latency: from asking for the reading to having it [s].
+    """
+
+    time: float
+    proximity: np.ndarray
+    pose: np.ndarray
+    rates: np.ndarray
+    latency: float
+
+
+class RealRobot:
+    """A robot on a connection; leaving its `with` block stops it, whatever happened.
+
+    A control step is two questions. As it starts, its speeds, if they changed: that is
+    `checked_cycle` with D, and the answer shows that they arrived. As it ends, the
+    reading. So the policy decides on what is sensed at that moment, as in simulation,
+    and not on what was sensed a control step ago.
+
+    Attributes:
+        schedule: when control steps end.
+        odometry: where it is.
+        last: what it reported last.
+        met: whether it ever answered.
+        waited: time spent on answers and on the schedule, since it started [s].
+    """
+
+    last: Moment
+
+    def __init__(
+        self,
+        connection: Connection,
+        calibration: Calibration,
+        control_step: float,
+        speed_max: float = float("inf"),
+        dry_run: bool = False,
+        start: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0),
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Nothing is sent yet.
+
+        Args:
+            connection: how to reach it.
+            calibration: in what it differs from the robot of the books.
+            control_step: duration of a control step [s].
+            speed_max: no wheel rolls faster than this [m/s].
+            dry_run: whether it has to stand still all the time.
+            start: pose `(3,)`: x, y [m], yaw [rad].
+            clock: what all times are told by; the connection's.
+            sleep: lets so many seconds go by.
+        """
+        self._connection = connection
+        self._calibration = calibration
+        self._wheel_speed_max = speed_max / max(calibration.wheel_radii)
+        self._dry_run = dry_run
+        self._clock = clock
+        self.met = False
+        self._rates = (0, 0)
+        self._fresh_until = float("inf")
+        self._origin = clock()
+        self.schedule = Schedule(control_step, clock, sleep)
+        self.odometry = Odometry(calibration, np.asarray(start, float))
+        self.waited = 0.0
+
+    @property
+    def n_repairs(self) -> int:
+        """How often host and robot had to find each other again."""
+        return self._connection.n_repairs
+
+    def __enter__(self) -> Self:
+        """Itself; nothing is sent yet."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Stop it, if it ever answered.
+
+        Raises:
+            StillMoving: if it does not say that it stopped.
+        """
+        try:
+            if self.met:
+                self._connection.stop()
+        finally:
+            self._connection.close()
+
+    def greet(self) -> Greeting:
+        """Who is there; it stands still."""
+        greeting = self._connection.greet()
+        self.met = True
+        return greeting
+
+    def calibrate(self) -> None:
+        """Let it set its sensors' zero; nothing may be near. It stands still."""
+        self._connection.calibrate()
+
+    def begin(self) -> Reading:
+        """The first reading; the first control step starts now."""
+        self._origin = self._clock()
+        self.waited = 0.0
+        # as at every tick: first the reading, then what comes of it
+        self.schedule.begin()
+        return self._sense()
+
+    def step(self, command: np.ndarray) -> Reading:
+        """Drive for one control step; what is sensed at its end.
+
+        Args:
+            command: wheel speeds [rad/s], `(2,)`.
+
+        Raises:
+            StaleReading: if there was no reading for READING_AGE_MAX.
+            RobotRestarted: if it was reset.
+            LinkLost: if the port is gone.
+        """
+        rates = (0, 0) if self._dry_run else self.told(command)
+        if rates != self._rates:
+            # unknown until it has answered
+            self._cycle(rates, changed=True)
+            self._rates = rates
+        before = self._clock()
+        self.schedule.wait()
+        self.waited += self._clock() - before
+        return self._sense()
+
+    def told(self, command: np.ndarray) -> tuple[int, int]:
+        """Whole steps/s for wheel speeds `(2,)` [rad/s], slowed alike if too fast."""
+        fastest = float(np.abs(command).max())
+        slowed = command * min(1.0, self._wheel_speed_max / max(fastest, STEP_ANGLE))
+        left, right = step_rates(slowed).tolist()
+        return left, right
+
+    def _sense(self) -> Reading:
+        asked = self._clock()
+        counts = self._cycle(self._rates, changed=False)
+        now = self._clock()
+        self.last = Moment(
+            time=now - self._origin,
+            proximity=counts,
+            pose=self.odometry.pose,
+            rates=np.array(self._rates),
+            latency=now - asked,
+        )
+        distance = sensed_distance(counts, self._calibration.gains)
+        return Reading(distance, np.zeros((), bool), counts)
+
+    def _cycle(self, rates: tuple[int, int], changed: bool) -> np.ndarray:
+        """Counts `(8,)` as they are now; keeps the time and the odometry."""
+        asked = self._clock()
+        if asked > self._fresh_until:
+            age = asked - self._fresh_until + READING_AGE_MAX
+            raise _stale(f"none for {age * 1000:.0f} ms: this computer was busy")
+        until = min(self._fresh_until, asked + READING_AGE_MAX)
+        try:
+            cycle = self._connection.cycle(*rates, changed, until)
+        except (LinkLost, RobotRestarted):
+            raise
+        except BridgeError as error:
+            raise _stale(f"none: {error}") from None
+        finally:
+            self.waited += self._clock() - asked
+        now = self._clock()
+        self._fresh_until = now + READING_AGE_MAX
+        self.odometry.update(cycle.steps, asked, now)
+        return np.array(cycle.proximity.counts, float)
+
+
+def _stale(came: str) -> StaleReading:
+    return StaleReading(f"a reading every {READING_AGE_MAX * 1000:.0f} ms", came)

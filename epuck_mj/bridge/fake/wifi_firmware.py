@@ -1,0 +1,113 @@
+"""An emulated e-puck2 that listens on TCP, selector at 15.
+
+It says nothing until its first command, then streams packets for ever, even when
+nobody is left; the last speeds persist. Commands wait for their turn, one a packet;
+those that find the queue full are dropped. It fills in what the bridge reads:
+proximity, ambient light, steps and selector; everything else in a packet is zero.
+
+Where the sources leave room, it was decided: what comes before a command's first byte
+is skipped; it goes on streaming while it calibrates.
+
+Source: GCtronic's wiki, "e-puck2 PC side development"; `socket_e-puck2.c`,
+`uart_e-puck2.c`.
+"""
+
+import struct
+from collections import deque
+
+from epuck_mj.bridge.fake.motors_and_sensors import (
+    Body,
+    Motors,
+    MotorTimer,
+    ProximitySensors,
+)
+from epuck_mj.constants import (
+    MOTOR_TICK_RATE_2,
+    PROXIMITY_PERIOD_2,
+    STEP_RATE_MAX,
+    WIFI_PERIOD,
+    WIFI_QUEUE,
+)
+
+TIMER = MotorTimer(STEP_RATE_MAX, MOTOR_TICK_RATE_2, saves_current=False)
+"""Its motors, behind a radio that accepts less than the main processor does."""
+
+
+class WifiFirmware:
+    """An e-puck2's radio and main processor, from the power switch on."""
+
+    def __init__(self, body: Body, now: float) -> None:
+        """Switch it on.
+
+        Args:
+            body: what it moves and senses with.
+            now: the time [s].
+        """
+        self._body = body
+        self._motors = Motors(body, TIMER)
+        self._sensors = ProximitySensors(body, PROXIMITY_PERIOD_2, now)
+        self._buffer = b""
+        self._queue: deque[bytes] = deque()
+        self._streams: int | None = None
+        self._n_packets = int(now / WIFI_PERIOD)
+        self._out = bytearray()
+
+    @property
+    def n_told(self) -> int:
+        """How often it has told its proximity counts since it started."""
+        return self._sensors.n_told
+
+    def feed(self, data: bytes, now: float) -> None:
+        """Let it hear something.
+
+        Args:
+            data: any number of bytes.
+            now: the time [s], never less than before.
+        """
+        self._advance(now)
+        self._buffer += data
+        while (start := self._buffer.find(0x80)) >= 0:
+            if len(self._buffer) < start + 21:
+                return
+            if len(self._queue) < WIFI_QUEUE:
+                self._queue.append(self._buffer[start : start + 21])
+            self._buffer = self._buffer[start + 21 :]
+        self._buffer = b""
+
+    def output(self, now: float) -> bytes:
+        """What it has said since the last call; it also is what makes time go by.
+
+        Args:
+            now: the time [s], never less than before.
+        """
+        self._advance(now)
+        out = bytes(self._out)
+        self._out.clear()
+        return out
+
+    def _advance(self, now: float) -> None:
+        self._sensors.advance(now)
+        due = int(now / WIFI_PERIOD) - self._n_packets
+        for _ in range(due):
+            self._n_packets += 1
+            if self._queue:
+                self._obey(self._queue.popleft())
+            if self._streams is not None:
+                self._out += self._packets(self._streams)
+
+    def _obey(self, command: bytes) -> None:
+        self._streams, settings, left, right = struct.unpack_from("<BBhh", command, 1)
+        if settings & 0b001:
+            self._sensors.calibrate()
+        self._motors.drive(left, right)
+
+    def _packets(self, streams: int) -> bytes:
+        image = b"\x01" + bytes(38400) if streams & 0b01 else b""
+        if not streams & 0b10:
+            return image or b"\x03"
+        body = bytearray(104)
+        struct.pack_into("<8H", body, 37, *self._sensors.proximity())
+        struct.pack_into("<8H", body, 53, *self._sensors.ambient())
+        struct.pack_into("<2h", body, 79, *self._motors.counters())
+        body[89] = self._body.selector()
+        return image + b"\x02" + body

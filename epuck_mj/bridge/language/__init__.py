@@ -1,0 +1,1 @@
+"""The bytes that an e-puck's firmwares understand and send."""

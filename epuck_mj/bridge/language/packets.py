@@ -1,0 +1,108 @@
+"""The e-puck2's dialect over WiFi: 21-byte commands, a stream of packets back.
+
+After the first command packets come by themselves, so the next packet may be older
+than the last command. TCP loses no byte: a packet of an unknown kind means that the
+other side is no e-puck2, and only connecting anew helps. Not recognisable: anything
+wrong within a packet that leaves counts in 12 bits and the selector in 0 to 15.
+
+Source: GCtronic's wiki, "e-puck2 PC side development"; `socket_e-puck2.c`.
+"""
+
+import struct
+
+from epuck_mj.bridge.errors import BridgeError
+from epuck_mj.bridge.language.ascii import check_speeds
+from epuck_mj.bridge.language.replies import Ambient, Proximity, Sensors, Steps
+from epuck_mj.constants import N_PROXIMITY
+
+COMMAND_BYTES = 21
+"""Length of a command."""
+
+COMMAND = 0x80
+"""First byte of a command."""
+
+STREAM_IMAGE = 0b01
+STREAM_SENSORS = 0b10
+"""What is to be streamed, bits of a command's byte 1."""
+
+CALIBRATE = 0b001
+"""Bit of a command's byte 2: the proximity sensors' offsets are measured anew."""
+
+IMAGE, SENSORS, EMPTY = 0x01, 0x02, 0x03
+"""First byte of a packet, its kind."""
+
+BODY_BYTES = {IMAGE: 160 * 120 * 2, SENSORS: 104, EMPTY: 0}
+"""Bytes of a packet after its kind."""
+
+AT_PROXIMITY, AT_AMBIENT, AT_STEPS, AT_SELECTOR = 37, 53, 79, 89
+"""Where things are in a sensor packet, its kind not counted."""
+
+COUNTS = struct.Struct(f"<{N_PROXIMITY}H")
+PAIR = struct.Struct("<2h")
+
+
+def command(left: int, right: int, calibrate: bool = False) -> bytes:
+    """A command: speeds, sensors to be streamed, LEDs and sound off.
+
+    Args:
+        left: of the left motor [steps/s].
+        right: of the right motor [steps/s].
+        calibrate: the proximity sensors; nothing may be in their range.
+
+    Returns:
+        21 bytes.
+
+    Raises:
+        BridgeError: beyond +-1000, where the robot would saturate in silence.
+    """
+    check_speeds(left, right)
+    head = bytes([COMMAND, STREAM_SENSORS, CALIBRATE if calibrate else 0])
+    return (head + PAIR.pack(left, right)).ljust(COMMAND_BYTES, b"\0")
+
+
+class PacketParser:
+    """Cuts what comes from an e-puck2 into packets; good for one connection."""
+
+    def __init__(self) -> None:
+        """Nothing came yet."""
+        self._buffer = b""
+
+    def feed(self, data: bytes) -> list[Sensors]:
+        """The sensor packets that are complete now, oldest first; images are skipped.
+
+        Args:
+            data: what came, any number of bytes.
+
+        Raises:
+            BridgeError: if this is no packet of an e-puck2.
+        """
+        self._buffer += data
+        found = []
+        while self._buffer:
+            kind = self._buffer[0]
+            if kind not in BODY_BYTES:
+                raise BridgeError("a packet of kind 1, 2 or 3", self._buffer)
+            end = 1 + BODY_BYTES[kind]
+            if len(self._buffer) < end:
+                break
+            body, self._buffer = self._buffer[1:end], self._buffer[end:]
+            if kind == SENSORS:
+                found.append(sensors(body))
+        return found
+
+
+def sensors(body: bytes) -> Sensors:
+    """What the bridge reads of a sensor packet.
+
+    Args:
+        body: its 104 bytes.
+
+    Raises:
+        BridgeError: if counts or selector are out of their range.
+    """
+    return Sensors(
+        Proximity(COUNTS.unpack_from(body, AT_PROXIMITY)),
+        Ambient(COUNTS.unpack_from(body, AT_AMBIENT)),
+        Steps(*PAIR.unpack_from(body, AT_STEPS)),
+        body[AT_SELECTOR],
+    )

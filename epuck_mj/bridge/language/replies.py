@@ -1,0 +1,174 @@
+"""What an e-puck answers, whichever dialect it was asked in."""
+
+from dataclasses import dataclass
+
+from epuck_mj.bridge.errors import BridgeError
+from epuck_mj.constants import N_PROXIMITY, N_SELECTOR, PROXIMITY_COUNT_MAX
+
+
+@dataclass(frozen=True)
+class Acknowledged:
+    """The robot has done what it was told.
+
+    Attributes:
+        letter: of the command, in lower case.
+    """
+
+    letter: str
+
+
+@dataclass(frozen=True)
+class Version:
+    """Which firmware answers.
+
+    Attributes:
+        lines: the firmware's line and, if the robot has one, the hardware's.
+    """
+
+    lines: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Battery:
+    """What the robot says of its battery.
+
+    Attributes:
+        state: `1` if it is good and `0` if it is low; of some, a raw value and per
+            cent.
+    """
+
+    state: str
+
+    def __str__(self) -> str:
+        """For a person."""
+        return {"0": "low", "1": "good"}.get(self.state, self.state)
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """The proximity sensors read zero for what they see now."""
+
+
+@dataclass(frozen=True)
+class Restarted:
+    """The robot was reset as asked."""
+
+
+@dataclass(frozen=True)
+class Proximity:
+    """Proximity counts ps0..ps7, growing as things come near.
+
+    Attributes:
+        counts: `(8,)`, each 0 to 4095.
+    """
+
+    counts: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse what 12 bits cannot say."""
+        _check_counts("proximity", self.counts)
+
+
+@dataclass(frozen=True)
+class Ambient:
+    """Ambient light counts of the sensors ps0..ps7, growing as it gets dark.
+
+    Attributes:
+        counts: `(8,)`, each 0 to 4095.
+    """
+
+    counts: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse what 12 bits cannot say."""
+        _check_counts("ambient light", self.counts)
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Step counters, wrapping at +-32768.
+
+    Attributes:
+        left: of the left motor [steps].
+        right: of the right motor [steps].
+    """
+
+    left: int
+    right: int
+
+    def __post_init__(self) -> None:
+        """Refuse what 16 bits cannot say."""
+        _check_words("step counters", (self.left, self.right))
+
+
+@dataclass(frozen=True)
+class Speeds:
+    """The speeds last commanded, as they came; nobody measures them.
+
+    Attributes:
+        left: of the left motor [steps/s].
+        right: of the right motor [steps/s].
+    """
+
+    left: int
+    right: int
+
+    def __post_init__(self) -> None:
+        """Refuse what 16 bits cannot say."""
+        _check_words("commanded speeds", (self.left, self.right))
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """What a control step needs to know of the robot.
+
+    Attributes:
+        proximity: the proximity counts.
+        steps: the step counters.
+    """
+
+    proximity: Proximity
+    steps: Steps
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What the bridge reads of an e-puck2's sensor packet.
+
+    Attributes:
+        proximity: the proximity counts.
+        ambient: the ambient light counts.
+        steps: the step counters.
+        selector: position of the selector, 0 to 15.
+    """
+
+    proximity: Proximity
+    ambient: Ambient
+    steps: Steps
+    selector: int
+
+    def __post_init__(self) -> None:
+        """Refuse a selector with more positions than there are."""
+        if not 0 <= self.selector < N_SELECTOR:
+            raise BridgeError(
+                f"a selector from 0 to {N_SELECTOR - 1}", f"{self.selector}"
+            )
+
+
+def _check_counts(name: str, counts: tuple[int, ...]) -> None:
+    if len(counts) != N_PROXIMITY or not all(
+        0 <= count <= PROXIMITY_COUNT_MAX for count in counts
+    ):
+        raise BridgeError(
+            f"{N_PROXIMITY} {name} counts from 0 to {PROXIMITY_COUNT_MAX}", f"{counts}"
+        )
+
+
+def _check_words(name: str, values: tuple[int, ...]) -> None:
+    if not all(-(2**15) <= value < 2**15 for value in values):
+        raise BridgeError(f"{name} of 16 bits", f"{values}")
+
+
+def wrapped(count: int) -> int:
+    """As a signed integer of 16 bits."""
+    return (count + 2**15) % 2**16 - 2**15

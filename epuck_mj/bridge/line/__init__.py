@@ -1,0 +1,1 @@
+"""The cable: serial ports, WiFi, connections, who stops a lost robot."""

@@ -1,0 +1,39 @@
+"""A connection by the port's name: over a serial line, or to an e-puck2 over WiFi."""
+
+from urllib.parse import urlsplit
+
+from epuck_mj.bridge.language.protocol import RESYNC, ascii, packets
+from epuck_mj.bridge.line.connection import Connection
+from epuck_mj.bridge.line.link import Link
+from epuck_mj.bridge.line.serial_line import SerialLine
+from epuck_mj.bridge.line.serial_port import SerialPort
+from epuck_mj.bridge.line.wifi_line import WifiLine
+from epuck_mj.constants import WIFI_PORT
+from epuck_mj.errors import UserError
+
+WIFI = "tcp://"
+"""What the name of a WiFi robot begins with."""
+
+
+def connect(port: str) -> Connection:
+    """A connection to the robot at a port; nothing is opened yet.
+
+    Args:
+        port: `/dev/rfcomm0`, `COM5`, `socket://host:port`, or `tcp://host[:port]`.
+
+    Raises:
+        UserError: if it is no address.
+    """
+    if port.startswith(WIFI):
+        name = f"socket://{port.removeprefix(WIFI)}"
+        try:
+            address = urlsplit(name).netloc
+        except ValueError as error:
+            raise UserError(f"expected {WIFI}host[:port], got '{port}': {error}") from (
+                None
+            )
+        if not address.rpartition("]")[2].count(":"):
+            name += f":{WIFI_PORT}"
+        return WifiLine(lambda: SerialPort(name, packets.command(0, 0)))
+    farewell = RESYNC.flush + ascii.stop().out
+    return SerialLine(Link(lambda: SerialPort(port, farewell)))

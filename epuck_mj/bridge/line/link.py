@@ -1,0 +1,194 @@
+"""The link to a robot: requests out, replies in, on a port that may fail at any time.
+
+One request is in flight at a time, and every wait ends at a time that the caller sets.
+A link whose last request was not answered is out of step and asks nothing before it
+went through `protocol.RESYNC`.
+"""
+
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+from epuck_mj.bridge.errors import BridgeError, LinkLost, NoReply, RobotRestarted
+from epuck_mj.bridge.language.protocol import RESYNC, Request, greets
+from epuck_mj.bridge.line.connection import Clock, Port
+from epuck_mj.bridge.line.losable_port import LosablePort
+from epuck_mj.errors import UserError
+
+T = TypeVar("T")
+
+REOPEN_PERIOD = 0.1
+"""Time between two attempts to open a lost port [s]. Chosen."""
+
+DROPPED_MAX = 1024
+"""Bytes kept of what is dropped: enough to see a banner in."""
+
+
+class Link:
+    """A conversation with a robot on a serial line.
+
+    Attributes:
+        clock: what all times are told by [s].
+        in_step: whether the last request was answered, and nothing else came.
+    """
+
+    def __init__(
+        self,
+        open_port: Callable[[], Port],
+        clock: Clock = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Open the port.
+
+        Args:
+            open_port: opens it, and again if it was lost.
+            clock: what all times are told by.
+            sleep: lets so many seconds go by.
+
+        Raises:
+            UserError: if the port cannot be opened.
+        """
+        self.clock = clock
+        self._sleep = sleep
+        self._port = LosablePort(open_port)
+        self.in_step = False
+        self._rest = b""
+        self._unanswered = False
+
+    @property
+    def lost(self) -> bool:
+        """Whether the port has to be opened again."""
+        return self._port.lost
+
+    def close(self) -> None:
+        """Let go of the port."""
+        self._port.close()
+
+    def reopen(self, until: float) -> None:
+        """Open the lost port as soon as it is there again.
+
+        Args:
+            until: when to give up, by the clock.
+
+        Raises:
+            LinkLost: if it does not come back.
+        """
+        self.close()
+        self.in_step, self._rest, self._unanswered = False, b"", False
+        while True:
+            try:
+                self._port.reopen()
+                return
+            except UserError as error:
+                if self.clock() >= until:
+                    raise LinkLost("the port to come back", str(error)) from None
+            self._sleep(REOPEN_PERIOD)
+
+    def ask(self, request: Request[T], until: float = float("inf")) -> T:
+        """The reply to a request.
+
+        Args:
+            request: what to ask.
+            until: when to give up, by the clock, if the request's own patience does
+                not end before.
+
+        Raises:
+            BridgeError: if the reply does not come, or something else does; the link
+                then is out of step.
+            RobotRestarted: if the robot was reset.
+            LinkLost: if the port is gone.
+        """
+        binary = request.out.endswith(b"\0")
+        stale = self._rest + self._port.receive(0.0)
+        # half a banner may be in what is of no use here: `resync` looks at it again
+        self._rest = stale
+        if not self.in_step:
+            raise BridgeError("host and robot in step", stale or "an open question")
+        # until the reply is here, whatever happens, a signal included
+        self.in_step = False
+        if greets(stale):
+            raise RobotRestarted(f"silence before {request.name}", stale)
+        if stale and binary:
+            raise BridgeError(f"silence before {request.name}", stale)
+        self._rest = b""
+        parser = request.parser()
+        deadline = min(self.clock() + request.patience, until)
+        self._port.send(request.out)
+        while (now := self.clock()) < deadline:
+            data = self._port.receive(deadline - now)
+            if not data:
+                continue
+            self._rest += data
+            reply = parser.feed(data)
+            if reply is not None:
+                self._rest = parser.rest
+                self.in_step = True
+                return reply
+            if binary:
+                # bytes come without a pause: the rest of them was lost
+                deadline = min(self.clock() + RESYNC.quiet, until)
+        raise NoReply(f"a reply to {request.name} in time", self._rest or "nothing")
+
+    def resync(self, until: float) -> bool:
+        """Find each other again; what the robot had heard of has been carried out.
+
+        Args:
+            until: when to give up, by the clock.
+
+        Returns:
+            Whether the robot's banner came: it was reset.
+
+        Raises:
+            BridgeError: if there is nobody who answers as an e-puck.
+            LinkLost: if the port is gone.
+        """
+        restarted, came = False, b""
+        while True:
+            self.in_step = False
+            self._port.send(RESYNC.flush)
+            dropped = self._rest + self.drain(until)
+            self._rest = b""
+            restarted |= greets(dropped)
+            came = dropped or came
+            if self.clock() >= until:
+                raise NoReply("an e-puck that answers V", came or "nothing")
+            self.in_step = True
+            try:
+                self.ask(RESYNC.barrier, until)
+                # an older barrier's reply may have come for this one's
+                late = self.drain(until) if self._unanswered else b""
+                if not self._rest + late:
+                    self._unanswered = False
+                    return restarted
+            except LinkLost:
+                raise
+            except RobotRestarted:
+                restarted = True
+            except BridgeError:
+                self._unanswered = True
+
+    def drain(self, until: float) -> bytes:
+        """What comes before nothing has come for a while, or until then.
+
+        Raises:
+            LinkLost: if the port is gone.
+        """
+        came = b""
+        heard = self.clock()
+        while (now := self.clock()) < min(heard + RESYNC.quiet, until):
+            data = self._port.receive(heard + RESYNC.quiet - now)
+            if data:
+                came = (came + data)[-DROPPED_MAX:]
+                heard = self.clock()
+        return came
+
+    def flush(self) -> None:
+        """End whatever the robot waits for; to be followed by ASCII.
+
+        Raises:
+            LinkLost: if the port is gone.
+        """
+        self._rest = b""
+        self._port.receive(0.0)
+        self._port.send(RESYNC.flush)
+        self.in_step = True

@@ -1,0 +1,105 @@
+"""A robot on a serial line: an e-puck v1 over Bluetooth, an e-puck2 over either."""
+
+from epuck_mj.bridge.errors import (
+    BridgeError,
+    LinkLost,
+    RobotRestarted,
+    StillMoving,
+)
+from epuck_mj.bridge.language.protocol import Cycle, ascii, binary
+from epuck_mj.bridge.line.connection import Greeting
+from epuck_mj.bridge.line.link import Link
+from epuck_mj.constants import CONNECT_TIME_MAX, STOP_REPLY_TIME, STOP_TIME_MAX
+
+
+class SerialLine:
+    """See Connection.
+
+    Attributes:
+        n_repairs: how often a resynchronisation was needed.
+    """
+
+    def __init__(self, link: Link) -> None:
+        """On a link that is open."""
+        self._link = link
+        self._busy_until = 0.0
+        self.n_repairs = 0
+
+    def greet(self) -> Greeting:
+        """See Connection."""
+        until = self._link.clock() + CONNECT_TIME_MAX
+        # whatever it did before we came: first it stands still
+        self._link.flush()
+        try:
+            self._link.ask(ascii.stop(), self._link.clock() + STOP_REPLY_TIME)
+        except LinkLost:
+            raise
+        except BridgeError:
+            # half a word of whoever was there before
+            pass
+        self._link.resync(until)
+        self._link.ask(ascii.stop(), until)
+        version = self._link.ask(ascii.version(), until)
+        try:
+            battery = str(self._link.ask(ascii.battery(), until))
+        except LinkLost:
+            raise
+        except BridgeError:
+            # the others toggle an LED, or do not understand
+            self._link.resync(until)
+            battery = "unknown to this firmware"
+        return Greeting(", ".join(version.lines), battery)
+
+    def cycle(self, left: int, right: int, changed: bool, until: float) -> Cycle:
+        """See Connection; out of step, the two find each other again until then.
+
+        Raises:
+            BridgeError: if they did not; names what was wrong first.
+            RobotRestarted: if the robot was reset.
+            LinkLost: if the port is gone.
+        """
+        first: BridgeError | None = None
+        while True:
+            try:
+                if not self._link.in_step:
+                    self.n_repairs += 1
+                    if self._link.resync(until):
+                        raise RobotRestarted("a robot that goes on", "its banner")
+                    # nobody knows what it has made of the last speeds
+                    changed = True
+                return self._link.ask(binary.checked_cycle(left, right, changed), until)
+            except (LinkLost, RobotRestarted):
+                raise
+            except BridgeError as error:
+                first = first or error
+                if self._link.clock() >= until:
+                    raise first from None
+
+    def calibrate(self) -> None:
+        """See Connection."""
+        request = ascii.calibrate()
+        self._busy_until = self._link.clock() + request.patience
+        self._link.ask(request)
+        self._busy_until = 0.0
+
+    def stop(self) -> None:
+        """See Connection."""
+        now = self._link.clock()
+        # while it calibrates it hears nobody
+        until = max(now, self._busy_until) + STOP_TIME_MAX
+        problem: BridgeError | None = None
+        while problem is None or self._link.clock() < until:
+            try:
+                if self._link.lost:
+                    self._link.reopen(until)
+                # at once, instead of waiting for silence as a resync does
+                self._link.flush()
+                self._link.ask(ascii.stop(), self._link.clock() + STOP_REPLY_TIME)
+                return
+            except BridgeError as error:
+                problem = error
+        raise StillMoving("the robot to say that it stopped", f"none: {problem}")
+
+    def close(self) -> None:
+        """See Connection."""
+        self._link.close()

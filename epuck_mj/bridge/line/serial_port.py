@@ -1,0 +1,118 @@
+"""Ports of pyserial, which may fail at any time. The only `import serial`."""
+
+import errno
+
+import serial
+from serial.tools import list_ports
+
+from epuck_mj.bridge.errors import LinkLost
+from epuck_mj.bridge.line import guardian
+from epuck_mj.constants import BAUD_RATE
+from epuck_mj.errors import UserError
+
+POLL_TIME = 0.01
+"""How long one look at a port waits for its first byte [s]."""
+
+WRITE_TIME_MAX = 0.5
+"""A port that takes no bytes for this long is lost [s]. Chosen."""
+
+READ_MAX = 4096
+"""Most bytes read at once."""
+
+
+class SerialPort:
+    """A port of pyserial: `/dev/rfcomm0`, `COM5` or `socket://host:port`."""
+
+    def __init__(self, name: str, farewell: bytes = b"") -> None:
+        """Open it; nobody else may have it.
+
+        Args:
+            name: of the port.
+            farewell: bytes that a guardian sends if this process dies with the port
+                open; nothing needs none. Not all ports can have one.
+
+        Raises:
+            UserError: if that is not possible; says why.
+        """
+        self.name = name
+        try:
+            self._serial = serial.serial_for_url(
+                name,
+                baudrate=BAUD_RATE,
+                timeout=POLL_TIME,
+                write_timeout=WRITE_TIME_MAX,
+                exclusive=True,
+            )
+        except (OSError, ValueError, TypeError) as error:
+            raise UserError(_why(name, error)) from None
+        self._guardian = None
+        try:
+            self._guardian = guardian.hire(self._serial.fileno, farewell)
+        except OSError as error:
+            self.close()
+            raise UserError(f"no guardian for '{name}': {error}") from None
+
+    def send(self, data: bytes) -> None:
+        """See Port."""
+        try:
+            self._serial.write(data)
+        except OSError as error:
+            raise self._lost(error) from None
+
+    def receive(self, timeout: float) -> bytes:
+        """See Port; a wait is at most POLL_TIME long, whatever the timeout."""
+        try:
+            # pyserial waits for as many bytes as one asks for
+            data = self._serial.read(1) if timeout > 0 else b""
+            if self._serial.in_waiting:
+                # and of a socket it does not know how many there are
+                self._serial.timeout = 0
+                data += self._serial.read(READ_MAX)
+                self._serial.timeout = POLL_TIME
+        except (OSError, TypeError, ValueError) as error:
+            raise self._lost(error) from None
+        return bytes(data)
+
+    def close(self) -> None:
+        """See Port."""
+        guardian.dismiss(self._guardian)
+        # pyserial forgets to close the socket of a peer that has gone
+        socket = getattr(self._serial, "_socket", None)
+        try:
+            self._serial.close()
+        except OSError:
+            pass
+        finally:
+            if socket is not None:
+                socket.close()
+
+    def _lost(self, error: Exception) -> LinkLost:
+        return LinkLost(f"a robot at '{self.name}'", f"'{_one_line(error)}'")
+
+
+def ports() -> list[tuple[str, str]]:
+    """The serial ports of this machine: name and description."""
+    return sorted((port.device, port.description) for port in list_ports.comports())
+
+
+def _why(name: str, error: Exception) -> str:
+    """One line on why a port cannot be opened."""
+    # pyserial wraps most errors, sometimes in the text only
+    number = getattr(error, "errno", None)
+    reason = _one_line(error)
+    if number == errno.ENOENT or isinstance(error, FileNotFoundError):
+        names = ", ".join(port for port, _ in ports()) or "none"
+        return f"no port '{name}'; available: {names}"
+    if number in (errno.EACCES, errno.EPERM):
+        return (
+            f"permission denied for port '{name}': its group, often dialout, may use it"
+        )
+    if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in reason:
+        return f"port '{name}' is busy: another program has it"
+    if "Inappropriate ioctl" in reason or number in (errno.EISDIR, errno.ENOTTY):
+        return f"'{name}' is not a serial port"
+    return f"cannot open port '{name}': {reason}"
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())

@@ -1,0 +1,139 @@
+"""An e-puck2 on the air: commands out, packets in without end, nothing acknowledged.
+
+What it senses now is in the first packet that comes after one asks; packets that came
+before are old and dropped. That it stopped is seen by its step counters.
+"""
+
+import time
+from collections.abc import Callable
+
+from epuck_mj.bridge.errors import BridgeError, LinkLost, NoReply, StillMoving
+from epuck_mj.bridge.language.packets import PacketParser, command
+from epuck_mj.bridge.language.replies import Cycle, Sensors, Steps
+from epuck_mj.bridge.line.connection import Clock, Greeting, Port
+from epuck_mj.bridge.line.losable_port import LosablePort
+from epuck_mj.constants import (
+    CALIBRATION_TIME_MAX,
+    CONNECT_TIME_MAX,
+    STOP_REPLY_TIME,
+    STOP_TIME_MAX,
+    WIFI_PERIOD,
+)
+from epuck_mj.errors import UserError
+
+STANDING_TIME = 0.1
+"""Counters that stay as they are for this long belong to a robot at rest [s]. Chosen.
+
+A wheel slower than 10 steps/s, 1.3 mm/s, is not noticed.
+"""
+
+
+class WifiLine:
+    """See Connection.
+
+    Attributes:
+        n_repairs: none: TCP loses no byte, and what is no packet ends the drive.
+    """
+
+    n_repairs = 0
+
+    def __init__(
+        self,
+        open_port: Callable[[], Port],
+        clock: Clock = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Connect.
+
+        Args:
+            open_port: connects, and again if the connection was lost.
+            clock: what all times are told by.
+            sleep: lets so many seconds go by.
+
+        Raises:
+            UserError: if nobody is there.
+        """
+        self._clock = clock
+        self._sleep = sleep
+        self._port = LosablePort(open_port)
+        self._parser = PacketParser()
+
+    def greet(self) -> Greeting:
+        """See Connection."""
+        self._port.send(command(0, 0))
+        sensors = self._next(self._clock() + CONNECT_TIME_MAX)
+        self.stop()
+        return Greeting(
+            f"e-puck2 over WiFi, selector at {sensors.selector}", "not told over WiFi"
+        )
+
+    def cycle(self, left: int, right: int, changed: bool, until: float) -> Cycle:
+        """See Connection.
+
+        Raises:
+            BridgeError: if what comes is no packet, or nothing comes.
+            LinkLost: if the connection is gone.
+        """
+        if changed:
+            self._port.send(command(left, right))
+        self._drop()
+        sensors = self._next(until)
+        return Cycle(sensors.proximity, sensors.steps)
+
+    def calibrate(self) -> None:
+        """See Connection; nobody says when it is done, so all its time goes by."""
+        self._port.send(command(0, 0, calibrate=True))
+        self._port.send(command(0, 0))
+        end = self._clock() + CALIBRATION_TIME_MAX
+        while self._clock() < end:
+            self._next(end + WIFI_PERIOD + STOP_REPLY_TIME)
+
+    def stop(self) -> None:
+        """See Connection."""
+        until = self._clock() + STOP_TIME_MAX
+        problem: BridgeError = NoReply("counters at rest", "nothing")
+        while self._clock() < until:
+            try:
+                if self._port.lost:
+                    self._port.reopen()
+                    self._parser = PacketParser()
+                if self._rests():
+                    return
+                problem = NoReply("step counters at rest", "others all the time")
+            except UserError as error:
+                self.close()
+                problem = LinkLost("step counters at rest", str(error))
+                self._sleep(STANDING_TIME)
+        raise StillMoving("the robot to stand still", f"none: {problem}")
+
+    def close(self) -> None:
+        """See Connection."""
+        self._port.close()
+
+    def _rests(self) -> bool:
+        """Whether it stands after it was told to."""
+        self._port.send(command(0, 0))
+        self._drop()
+        # commands wait for their turn: what it does now says nothing yet
+        self._next(self._clock() + STOP_REPLY_TIME)
+        began = self._clock()
+        first: Steps | None = None
+        while self._clock() < began + STANDING_TIME:
+            steps = self._next(self._clock() + STOP_REPLY_TIME).steps
+            if first is not None and steps != first:
+                return False
+            first = steps
+        return True
+
+    def _drop(self) -> None:
+        """Forget the packets that are here, but keep in step with half ones."""
+        while data := self._port.receive(0.0):
+            self._parser.feed(data)
+
+    def _next(self, until: float) -> Sensors:
+        """The latest of the packets that come next."""
+        while (now := self._clock()) < until:
+            found = self._parser.feed(self._port.receive(until - now))
+            if found:
+                return found[-1]
+        raise NoReply("a packet of an e-puck2 in time", "nothing")

@@ -1,0 +1,1 @@
+"""Environments for agents: the dm_control task."""

@@ -1,0 +1,184 @@
+"""dm_control tasks: wall following as a `dm_env` environment, for anybody's agent.
+
+The suite's habit: `env = epuck_mj.load("follow_walls", {"random": 1})`. The parts
+(observe, command, step fitness) are those of batched evaluation, so that the same
+actions give the same bits.
+"""
+
+# dm_control's base class has no types: its abstract methods look as if they gave None
+# pyright: reportIncompatibleMethodOverride=false
+
+from collections import OrderedDict
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from dm_control import mujoco
+from dm_control.mujoco.wrapper import MjModel
+from dm_control.rl import control
+from dm_control.suite import base
+from dm_control.utils import containers
+from dm_env import specs
+
+from epuck_mj.constants import N_PROXIMITY
+from epuck_mj.errors import UserError
+from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.starts import START_CLEARANCE, FreeSpace
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.step.motors import command
+from epuck_mj.step.sensors import Reading, observe
+
+SUITE = containers.TaggedTasks()
+
+
+def load(
+    task_name: str,
+    task_kwargs: Mapping[str, Any] | None = None,
+    environment_kwargs: Mapping[str, Any] | None = None,
+) -> control.Environment:
+    """An environment of the named task, as `dm_control.suite.load` gives it.
+
+    Args:
+        task_name: one of `SUITE`.
+        task_kwargs: arguments of the task's function below.
+        environment_kwargs: arguments of `dm_control.rl.control.Environment`, but for
+            `n_sub_steps` and `time_limit`, which the task knows.
+
+    Raises:
+        UserError: if there is no such task, or robot or arena cannot be used.
+    """
+    if task_name not in SUITE:
+        raise UserError(f"unknown task '{task_name}'; available: {', '.join(SUITE)}")
+    return SUITE[task_name](
+        environment_kwargs=environment_kwargs, **(task_kwargs or {})
+    )
+
+
+@SUITE.add()
+def follow_walls(
+    robot: str = "epuck",
+    arena: str = "arena",
+    parameters: TaskParameters | None = None,
+    start_clearance: float = START_CLEARANCE,
+    random: np.random.RandomState | int | None = None,
+    environment_kwargs: Mapping[str, Any] | None = None,
+) -> control.Environment:
+    """Follow the walls of an arena without touching them.
+
+    Args:
+        robot: name of a shipped robot, or path of an MJCF.
+        arena: name of a shipped arena, or path of an MJCF.
+        parameters: steps, control step, fitness, sensor range, speeds.
+        start_clearance: least distance from the shell to a wall at a start [m].
+        random: seed of the starts, or a generator to draw them from.
+        environment_kwargs: arguments of `dm_control.rl.control.Environment`, but for
+            `n_sub_steps` and `time_limit`, which the task knows.
+
+    Raises:
+        UserError: if robot or arena cannot be used.
+    """
+    parameters = parameters or TaskParameters()
+    scene = load_scene(robot, arena, parameters.control_step)
+    task = FollowWalls(
+        scene, parameters, space=FreeSpace(scene, start_clearance), random=random
+    )
+    return environment(scene, task, environment_kwargs)
+
+
+def environment(
+    scene: Scene,
+    task: "FollowWalls",
+    environment_kwargs: Mapping[str, Any] | None = None,
+) -> control.Environment:
+    """The environment of a task in its scene; a trial is `parameters.steps` long."""
+    return control.Environment(
+        mujoco.Physics.from_model(MjModel(scene.model)),
+        task,
+        n_sub_steps=scene.n_substeps,
+        # half a step less: a quotient of floats must not add one
+        time_limit=(task.parameters.steps - 0.5) * task.parameters.control_step,
+        **(environment_kwargs or {}),
+    )
+
+
+class FollowWalls(base.Task):
+    """Drive fast, straight and close to a wall; a crash ends the episode."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        parameters: TaskParameters,
+        space: FreeSpace | None = None,
+        starts: Iterable[np.ndarray] = (),
+        random: np.random.RandomState | int | None = None,
+    ):
+        """Set the task up.
+
+        Args:
+            scene: robot and arena.
+            parameters: what a trial is.
+            space: where random starts are drawn, once `starts` are used up.
+            starts: poses `(3,)` of the first episodes: x, y [m], yaw [rad].
+            random: seed of the random starts, or a generator to draw them from.
+        """
+        super().__init__(random=random)
+        self.parameters = parameters
+        self._scene = scene
+        self._space = space
+        self._starts: Iterator[np.ndarray] = iter(starts)
+        self._action = np.zeros(2)
+
+    def initialize_episode(self, physics: mujoco.Physics) -> None:
+        """Put the robot at rest on the next start."""
+        start = next(self._starts, None)
+        if start is None:
+            if self._space is None:
+                raise RuntimeError("no start left, and no free space to draw from")
+            rng = np.random.default_rng(self.random.randint(2**32, dtype=np.uint32))
+            start = self._space.sample(rng, 1)[0]
+        physics.data.qpos[:] = self._scene.qpos(start)
+        self._action = np.zeros(2)
+        super().initialize_episode(physics)
+
+    def action_spec(self, physics: mujoco.Physics) -> specs.BoundedArray:
+        """V (forward) in [0, 1] and w (turn, right positive) in [-1, 1]."""
+        return specs.BoundedArray((2,), float, (0.0, -1.0), (1.0, 1.0), name="v_w")
+
+    def observation_spec(
+        self, physics: mujoco.Physics
+    ) -> OrderedDict[str, specs.BoundedArray]:
+        """Eight values, 0 near to 1 free, in the order ps0..ps7."""
+        spec = specs.BoundedArray((N_PROXIMITY,), float, 0.0, 1.0, name="proximity")
+        return OrderedDict(proximity=spec)
+
+    def before_step(self, action: np.ndarray, physics: mujoco.Physics) -> None:
+        """Send the wheel speeds."""
+        self._action = np.array(action, float)
+        physics.data.ctrl[self._scene.wheels] = command(
+            self._action, self.parameters.speeds
+        )
+
+    def get_observation(self, physics: mujoco.Physics) -> OrderedDict[str, np.ndarray]:
+        """What the network sees."""
+        return OrderedDict(proximity=self._observe(physics))
+
+    def get_reward(self, physics: mujoco.Physics) -> float:
+        """Step fitness; 0 in the step of a crash."""
+        if self.crashed(physics):
+            return 0.0
+        fitness = self.parameters.step_fitness(self._action, self._observe(physics))
+        return float(fitness)
+
+    def get_termination(self, physics: mujoco.Physics) -> float | None:
+        """Discount 0 after a crash."""
+        return 0.0 if self.crashed(physics) else None
+
+    def crashed(self, physics: mujoco.Physics) -> bool:
+        """Whether the shell touches a wall."""
+        return bool(self._reading(physics).contact)
+
+    def _reading(self, physics: mujoco.Physics) -> Reading:
+        return self._scene.reading(physics.data.sensordata)
+
+    def _observe(self, physics: mujoco.Physics) -> np.ndarray:
+        return observe(self._reading(physics).distance, self.parameters.sensor_range)

@@ -1,0 +1,1 @@
+"""This computer: files, YAML and JSON, command lines, signals."""

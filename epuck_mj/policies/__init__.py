@@ -1,0 +1,1 @@
+"""Who drives: the evolved network, its file, the hand-written follower."""

@@ -1,0 +1,126 @@
+"""Controller files: a controller with its task, its origin and its scores, as JSON."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from epuck_mj.errors import UserError
+from epuck_mj.host.yaml_and_json import read_json
+from epuck_mj.policies.network import Controller, Network
+from epuck_mj.step.control import TaskParameters
+
+FORMAT = "epuck_mj.controller/1"
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a controller was evolved.
+
+    Attributes:
+        robot: name of a shipped robot, or path of its MJCF.
+        arena: name of a shipped arena, or path of its MJCF.
+        start_clearance: least distance from the shell to a wall at a start [m]; None
+            if the file does not say.
+        mjcf_sha256: of each file compiled: `arena`, `robot`, and all others by name.
+    """
+
+    robot: str
+    arena: str
+    start_clearance: float | None = None
+    mjcf_sha256: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
+        """What `dataclasses.asdict` gave; what else is there says nothing.
+
+        Raises:
+            ValueError: if it is anything else.
+        """
+        for key in ("robot", "arena"):
+            if not isinstance(fields.get(key), str):
+                raise ValueError(f"it does not say which {key} it is for")
+        clearance = fields.get("start_clearance")
+        known = isinstance(clearance, float) and 0 < clearance <= 1
+        if clearance is not None and not known:
+            raise ValueError(
+                f"expected a start_clearance in (0, 1] m, got {clearance!r}"
+            )
+        hashes = fields.get("mjcf_sha256", {})
+        if not isinstance(hashes, dict):
+            raise ValueError(f"expected an object as mjcf_sha256, got {hashes!r}")
+        return cls(fields["robot"], fields["arena"], clearance, hashes)
+
+
+@dataclass(frozen=True)
+class ControllerFile:
+    """A controller with all that is needed to use it.
+
+    Attributes:
+        network: its shape.
+        genome: its weights, `(genes,)`.
+        task: what its trials were.
+        origin: where it was evolved; `scene` in the JSON.
+        scores: stored and held-out fitness, and how each was measured.
+    """
+
+    network: Network
+    genome: np.ndarray
+    task: TaskParameters
+    origin: Origin
+    scores: dict[str, Any]
+
+    @property
+    def controller(self) -> Controller:
+        """The controller, ready to be called."""
+        return self.network.decode(self.genome)
+
+    def to_json(self) -> str:
+        """The file's text; the genome comes back bit for bit."""
+        fields = {
+            "format": FORMAT,
+            "network": asdict(self.network),
+            "task": asdict(self.task),
+            "scene": asdict(self.origin),
+            "scores": self.scores,
+            "genome": [float(gene) for gene in self.genome],
+        }
+        return json.dumps(fields, indent=1) + "\n"
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
+        """What `to_json`'s text says.
+
+        Raises:
+            ValueError: if it is anything else.
+        """
+        if fields.get("format") != FORMAT:
+            raise ValueError(f"expected format '{FORMAT}'")
+        for name in ("network", "task", "scene", "scores"):
+            if not isinstance(fields.get(name), dict):
+                raise ValueError(f"expected an object as {name}")
+        network = Network(**fields["network"])
+        genome = np.array(fields.get("genome", ()), float)
+        if genome.shape != (network.n_genes,):
+            raise ValueError(f"expected {network.n_genes} genes, got {genome.shape}")
+        if not np.isfinite(genome).all():
+            raise ValueError("expected finite genes")
+        task = TaskParameters.from_dict(fields["task"])
+        origin = Origin.from_dict(fields["scene"])
+        return cls(network, genome, task, origin, fields["scores"])
+
+
+def load(path: str | Path) -> ControllerFile:
+    """The controller stored at `path`.
+
+    Raises:
+        UserError: if there is none, or it is not a controller file.
+    """
+    fields = read_json(Path(path))
+    try:
+        return ControllerFile.from_dict(fields)
+    except (ValueError, TypeError, OverflowError) as error:
+        raise UserError(f"'{path}' is not a controller file: {error}") from None

@@ -1,0 +1,1 @@
+"""By which physics a robot moves: the simulators and their table."""

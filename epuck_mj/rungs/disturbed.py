@@ -1,0 +1,104 @@
+"""Simulated robots with the sensors and motors of real ones.
+
+Between the policy and the wheels stands the firmware, which knows whole steps per
+second only; between the walls and the policy stand sensors that count. What they count
+is put back into metres as the bridge does it on a robot.
+"""
+
+import numpy as np
+
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.step.disturbances import Disturbances
+from epuck_mj.step.motors import actual_rates, step_rates, wheel_speeds
+from epuck_mj.step.sensors import Reading, counted, sensed_distance
+
+
+def disturbed(
+    robots: SimulatedRobots, disturbances: Disturbances | None, control_step: float
+) -> "SimulatedRobots | DisturbedRobots":
+    """Robots with disturbances around them, or as they are if there are none.
+
+    Args:
+        robots: that drive.
+        disturbances: of each of them.
+        control_step: its duration [s].
+    """
+    if disturbances is None:
+        # nothing is left of those before
+        robots.disembody()
+        return robots
+    return DisturbedRobots(robots, disturbances, control_step)
+
+
+class DisturbedRobots:
+    """Robots in disturbances; steps like `SimulatedRobots`."""
+
+    def __init__(
+        self,
+        robots: SimulatedRobots,
+        disturbances: Disturbances,
+        control_step: float,
+    ):
+        """Put disturbances around robots.
+
+        Args:
+            robots: that drive.
+            disturbances: of each of them.
+            control_step: its duration [s].
+        """
+        self._robots = robots
+        self._disturbances = disturbances
+        self._share = disturbances.age / control_step
+
+    def reset(self, starts: np.ndarray) -> Reading:
+        """See `SimulatedRobots.reset`.
+
+        Raises:
+            ValueError: if there are not as many starts as disturbances.
+        """
+        given = self._disturbances
+        if len(starts) != len(given):
+            raise ValueError(f"expected {len(given)} starts, got {len(starts)}")
+        self._of, self._k = given.of, 0
+        # the robot stands: older commands were 0
+        self._sent = np.zeros((len(starts), given.latency.max() + 1, 2))
+        self._robots.embody(given.mass[given.of], given.friction[given.of])
+        reading = self._robots.reset(starts)
+        self._before = reading.distance
+        return self._sensed(reading)
+
+    def step(self, command: np.ndarray) -> Reading:
+        """See `SimulatedRobots.step`."""
+        given, of = self._disturbances, self._of
+        self._sent = np.roll(self._sent, 1, axis=1)
+        self._sent[:, 0] = command
+        arrived = self._sent[np.arange(len(of)), given.latency[of]]
+        wheels = wheel_speeds(actual_rates(step_rates(arrived)))
+        wheels *= given.wheel_gains[of] * (1 + given.wheel_noise[of, self._k])
+        # another track turns the robot less, or more, at the same speed
+        mean = wheels.mean(axis=-1, keepdims=True)
+        wheels = mean + (wheels - mean) * given.turn_gain[of, None]
+        self._k += 1
+        return self._sensed(self._robots.step(wheels))
+
+    def keep(self, mask: np.ndarray) -> None:
+        """See `SimulatedRobots.keep`."""
+        self._robots.keep(mask)
+        self._of, self._sent = self._of[mask], self._sent[mask]
+        self._before = self._before[mask]
+
+    def poses(self) -> np.ndarray:
+        """See `SimulatedRobots.poses`."""
+        return self._robots.poses()
+
+    def _sensed(self, reading: Reading) -> Reading:
+        """What the robots make of it; the truth goes along."""
+        given, of = self._disturbances, self._of
+        truth, before = reading.distance, self._before
+        self._before = truth
+        # of what is seen twice, readings are between the two
+        aged = truth + (before - truth) * self._share[of]
+        aged = np.where((truth < 0) | (before < 0), truth, aged)
+        counts = counted(aged, given.gains[of], given.count_noise[of, self._k])
+        distance = sensed_distance(counts, given.known_gains[of])
+        return Reading(distance, reading.contact, counts, truth)

@@ -1,0 +1,114 @@
+"""Any number of simulated robots, each in an arena of its own, stepped at once.
+
+One `mujoco.batch.Batch` holds them; its threads step the ones still active. What a
+robot does depends on its start and commands only: not on the number of threads, nor
+on which others share the batch.
+"""
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from epuck_mj.scene.model import Scene
+from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL
+from epuck_mj.step.sensors import Reading
+
+SPARE_SPEED = 2.0
+"""Of wheels of robots with bodies of their own, against the actuators' limits."""
+
+
+class SimulatedRobots:
+    """Up to `capacity` robots in copies of one scene."""
+
+    def __init__(self, scene: Scene, capacity: int, threads: int = 0):
+        """Allocate the robots.
+
+        Args:
+            scene: robot and arena.
+            capacity: the most robots that a reset can place.
+            threads: threads that step them; 0 is one per core.
+        """
+        self.scene = scene
+        self.capacity = capacity
+        # one MjData each, so that sensors refreshed after a step are not
+        # computed again at the start of the next
+        self._batch = Batch(scene.model, capacity, threads, persistent=True)
+        self._qpos = self._batch.bind("qpos")
+        self._ctrl = self._batch.bind("ctrl")
+        self._sensordata = self._batch.bind("sensordata")
+        self._active = np.zeros(0, np.int32)
+        self._embodied = False
+
+    def reset(self, starts: np.ndarray) -> Reading:
+        """Put a robot at rest on each start `(robots, 3)`: x, y [m], yaw [rad].
+
+        Raises:
+            ValueError: if there are more starts than robots.
+        """
+        if len(starts) > self.capacity:
+            raise ValueError(
+                f"expected at most {self.capacity} starts, got {len(starts)}"
+            )
+        self._active = np.arange(len(starts), dtype=np.int32)
+        self._batch.reset(self._active, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        self._qpos[: len(starts)] = self.scene.qpos(starts)
+        self._batch.forward(self._active, stage=mujoco.mjtStage.mjSTAGE_VEL.value)
+        return self._reading()
+
+    def step(self, command: np.ndarray) -> Reading:
+        """Drive the active robots for one control step.
+
+        Args:
+            command: wheel speeds [rad/s], `(active, 2)`.
+        """
+        self._ctrl[self._active[:, None], self.scene.wheels] = command
+        self._batch.step(
+            self._active,
+            nstep=self.scene.n_substeps,
+            stage=mujoco.mjtStage.mjSTAGE_VEL.value,
+        )
+        return self._reading()
+
+    def embody(self, mass: np.ndarray, friction: np.ndarray) -> None:
+        """Give the robots bodies of their own, from the next reset on.
+
+        Their wheels may turn faster than a firmware would ask for: larger ones do.
+
+        Args:
+            mass: of each robot against the scene's, `(robots,)`.
+            friction: of all but its shell, likewise.
+        """
+        model, n, wheels = self.scene.model, len(mass), self.scene.wheels
+        limits = self._batch.expand("actuator_ctrlrange")
+        limits[:n, wheels] = model.actuator_ctrlrange[wheels] * SPARE_SPEED
+        if not self._embodied and (mass == 1).all() and (friction == 1).all():
+            return
+        self._embodied = True
+        robot = model.body_rootid == model.body(ROBOT_BODY).id
+        tyres = robot[model.geom_bodyid]
+        tyres[model.geom(SHELL).id] = False
+        for name in ("body_mass", "body_inertia"):
+            field, own = self._batch.expand(name), getattr(model, name)[robot]
+            scale = mass.reshape(n, *[1] * own.ndim)
+            field[:n, robot] = own * scale
+        field = self._batch.expand("geom_friction")
+        field[:n, tyres] = model.geom_friction[tyres] * friction[:, None, None]
+        # what the contact solver has worked out from them
+        self._batch.set_const(np.arange(n, dtype=np.int32))
+
+    def disembody(self) -> None:
+        """Give the robots the scene's body back, from the next reset on."""
+        if self._embodied:
+            self.embody(np.ones(self.capacity), np.ones(self.capacity))
+            self._embodied = False
+
+    def keep(self, mask: np.ndarray) -> None:
+        """Go on with the active robots that `mask` `(active,)` names."""
+        self._active = self._active[mask]
+
+    def poses(self) -> np.ndarray:
+        """Where the active robots are, `(active, 3)`: x, y [m], yaw [rad]."""
+        return self.scene.poses(self._qpos[self._active])
+
+    def _reading(self) -> Reading:
+        return self.scene.reading(self._sensordata[self._active])

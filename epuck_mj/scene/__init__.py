@@ -1,0 +1,1 @@
+"""Where a robot drives: MJCF in, a compiled model and its geometry out."""

@@ -1,0 +1,116 @@
+"""What a compiled scene looks like and where it is, whatever robot and arena it has."""
+
+import mujoco
+import numpy as np
+
+from epuck_mj.scene.model import Scene
+from epuck_mj.scene.robot_parts import PROXIMITY, SHELL, can_touch, static
+
+UNSET_COLOR = np.array([0.5, 0.5, 0.5, 1], np.float32)
+"""Colour that MuJoCo gives to geoms without one."""
+
+COLLISION_GROUP = 3
+"""First group of geoms that are not meant to be seen, as in mujoco_menagerie."""
+
+
+def at_rest(model: mujoco.MjModel) -> mujoco.MjData:
+    """Where everything is before anything moves."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return data
+
+
+def mesh(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices `(n, 3)` [m] and faces `(m, 3)` of a geom that is a mesh."""
+    found = model.mesh(model.geom_dataid[geom])
+    return (
+        model.mesh_vert[found.vertadr[0] :][: found.vertnum[0]],
+        model.mesh_face[found.faceadr[0] :][: found.facenum[0]],
+    )
+
+
+def walls(model: mujoco.MjModel) -> np.ndarray:
+    """Which geoms stand still and can be hit by the robot's shell, `(ngeom,)`."""
+    return can_touch(model, model.geom(SHELL).id) & static(model)
+
+
+def moving_bodies(model: mujoco.MjModel) -> list[int]:
+    """Bodies that are not welded to the world."""
+    return np.flatnonzero(model.body_weldid != 0).tolist()
+
+
+def box_around(
+    model: mujoco.MjModel, geoms: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Corners of the box around the geoms of a mask `(ngeom,)`, `(3,)` each [m].
+
+    Planes have no end and do not count; None where nothing is left.
+    """
+    geoms = geoms & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
+    if not geoms.any():
+        return None
+    data = at_rest(model)
+    box, rotation = model.geom_aabb[geoms], data.geom_xmat[geoms].reshape(-1, 3, 3)
+    center = data.geom_xpos[geoms] + np.einsum("nij,nj->ni", rotation, box[:, :3])
+    half = np.einsum("nij,nj->ni", np.abs(rotation), box[:, 3:])
+    return (center - half).min(axis=0), (center + half).max(axis=0)
+
+
+def arena_box(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of the box around what is seen of the arena, `(3,)` each [m]."""
+    box = box_around(model, drawn(model) & static(model))
+    # an arena of a floor only
+    return box or (np.array([-0.5, -0.5, 0.0]), np.array([0.5, 0.5, 0.0]))
+
+
+def drawn(model: mujoco.MjModel) -> np.ndarray:
+    """Which geoms are meant to be seen, `(ngeom,)`.
+
+    Collision geoms are, if their body has nothing else to show.
+    """
+    visible = np.array([color(model, geom)[3] > 0 for geom in range(model.ngeom)])
+    looks = visible & (model.geom_group < COLLISION_GROUP)
+    has_looks = np.zeros(model.nbody, bool)
+    has_looks[model.geom_bodyid[looks]] = True
+    return looks | (visible & ~has_looks[model.geom_bodyid])
+
+
+def color(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """Colour of a geom, `(4,)` in [0, 1], as MuJoCo picks it; a texture's mean."""
+    rgba, material = model.geom_rgba[geom].copy(), model.geom_matid[geom]
+    # the material's, unless the geom has a colour of its own
+    if material < 0 or (rgba != UNSET_COLOR).any():
+        return rgba
+    rgba = model.mat_rgba[material].copy()
+    texture = model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB]
+    if texture >= 0:
+        rgba[:3] *= model.texture(texture).data[..., :3].mean(axis=(0, 1)) / 255
+    return rgba
+
+
+def kinematics(
+    scene: Scene, poses: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Where bodies and rays are on each pose `(n, 3)`, in the world.
+
+    Returns:
+        Positions [m] and quaternions of all bodies, `(n, nbody, 3)`, `(n, nbody, 4)`;
+        origins [m] and directions of the rays, `(n, 8, 3)` both.
+    """
+    model, data = scene.model, mujoco.MjData(scene.model)
+    sites = [model.sensor(name).objid[0] for name in PROXIMITY]
+    position, quaternion, origin, direction = [], [], [], []
+    for qpos in scene.qpos(poses):
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, data)
+        position.append(data.xpos.copy())
+        quaternion.append(data.xquat.copy())
+        origin.append(data.site_xpos[sites])
+        # a rangefinder looks along the z axis of its site
+        direction.append(data.site_xmat[sites][:, [2, 5, 8]])
+    return (
+        np.array(position),
+        np.array(quaternion),
+        np.array(origin),
+        np.array(direction),
+    )

@@ -1,0 +1,180 @@
+"""Scenes: a robot put into an arena, checked, compiled, names turned into indices.
+
+An arena is any MJCF with walls. It may include a robot, so that MuJoCo's viewer shows
+the whole scene; `load_scene` puts the robot asked for in that one's place. Robots
+differ in their base and nothing else: everybody else calls `Scene.qpos` and friends.
+"""
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from epuck_mj.errors import UserError
+from epuck_mj.scene.mjcf import find_arena, find_assets, find_robot, with_robot
+from epuck_mj.scene.robot_parts import (
+    PROXIMITY,
+    ROBOT_BODY,
+    SHELL,
+    TIMESTEP,
+    WHEELS,
+    check_base,
+    check_floor,
+    index_of,
+    sensor_address,
+)
+from epuck_mj.step.sensors import Reading
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A compiled scene and where its robot's parts are.
+
+    Attributes:
+        model: the compiled model.
+        n_substeps: physics steps in a control step.
+        wheels: indices of the wheels' actuators, left and right, `(2,)`.
+        robot: path of the robot's MJCF.
+        arena: path of the arena's MJCF.
+        sha256: of each file compiled: `arena`, `robot`, and all others by name.
+    """
+
+    model: mujoco.MjModel
+    n_substeps: int
+    wheels: np.ndarray
+    robot: Path
+    arena: Path
+    sha256: Mapping[str, str]
+    _distance: np.ndarray
+    _contact: int
+
+    @cached_property
+    def _base(self) -> tuple[int, bool]:
+        """First index of the base in qpos, and whether it is a free joint."""
+        joint = self.model.body(ROBOT_BODY).jntadr[0]
+        free = self.model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
+        return int(self.model.jnt_qposadr[joint]), bool(free)
+
+    def qpos(self, poses: np.ndarray) -> np.ndarray:
+        """Positions `(..., nq)` with the robot on `(..., 3)`: x, y [m], yaw [rad]."""
+        poses = np.asarray(poses, float)
+        base, free = self._base
+        qpos = np.broadcast_to(
+            self.model.qpos0, (*poses.shape[:-1], self.model.nq)
+        ).copy()
+        if free:
+            qpos[..., base : base + 2] = poses[..., :2]
+            qpos[..., base + 3] = np.cos(poses[..., 2] / 2)
+            qpos[..., base + 4 : base + 6] = 0.0
+            qpos[..., base + 6] = np.sin(poses[..., 2] / 2)
+        else:
+            qpos[..., base : base + 3] = poses
+        return qpos
+
+    def poses(self, qpos: np.ndarray) -> np.ndarray:
+        """Where the robot is, `(..., 3)`: x, y [m], yaw [rad], from `(..., nq)`."""
+        base, free = self._base
+        if not free:
+            return qpos[..., base : base + 3].copy()
+        w, x, y, z = np.moveaxis(qpos[..., base + 3 : base + 7], -1, 0)
+        yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        return np.concatenate([qpos[..., base : base + 2], yaw[..., None]], axis=-1)
+
+    def reading(self, sensordata: np.ndarray) -> Reading:
+        """What the robot reports, from MuJoCo's `(..., nsensordata)`."""
+        return Reading(
+            sensordata[..., self._distance], sensordata[..., self._contact] > 0
+        )
+
+
+def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
+    """Put a robot into an arena.
+
+    Args:
+        robot: name of a shipped robot, or path of an MJCF with the same interface.
+        arena: name of a shipped arena, or path of an MJCF with walls.
+        control_step: its duration [s], a multiple of the physics step.
+
+    Raises:
+        UserError: if a file is missing or broken, or a part of the robot is.
+    """
+    robot_path, arena_path = find_robot(robot), find_arena(arena)
+    # compiled alone first: errors in an included file have no line number
+    with _complaints(robot_path):
+        mujoco.MjSpec.from_file(str(robot_path)).compile()
+    scene = with_robot(arena_path, robot_path)
+    with _complaints(arena_path):
+        spec = mujoco.MjSpec.from_string(scene.text, include=dict(scene.files))
+        assets = find_assets(spec, scene)
+        # a robot that brings its converged step wants no other from the arena
+        step = spec.numeric(TIMESTEP)
+        if step is not None:
+            spec.option.timestep = step.data[0]
+        model = spec.compile()
+    contents = {"arena": scene.text.encode()}
+    for name, content in scene.files.items():
+        own = scene.paths[name] == robot_path
+        contents["robot" if own else name] = content
+    contents |= {name: path.read_bytes() for name, path in assets.items()}
+    sha256 = {
+        name: hashlib.sha256(content).hexdigest() for name, content in contents.items()
+    }
+    return _index(model, robot_path, arena_path, sha256, control_step)
+
+
+@contextmanager
+def _complaints(source: Path) -> Iterator[None]:
+    """MuJoCo's complaints about a file on one line."""
+    try:
+        yield
+    except ValueError as error:
+        message = " ".join(str(error).split())
+        raise UserError(f"MuJoCo cannot compile '{source}': {message}") from None
+
+
+def _index(
+    model: mujoco.MjModel,
+    robot: Path,
+    arena: Path,
+    sha256: Mapping[str, str],
+    control_step: float,
+) -> Scene:
+    """The scene of a compiled model that has all of the robot's parts."""
+    check_base(model, robot)
+    index_of(model, mujoco.mjtObj.mjOBJ_GEOM, SHELL, robot)
+    check_floor(model, arena)
+    wheels = [
+        index_of(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name, robot) for name in WHEELS
+    ]
+    distance = [
+        sensor_address(model, name, mujoco.mjtSensor.mjSENS_RANGEFINDER, robot)
+        for name in PROXIMITY
+    ]
+    contact = sensor_address(model, SHELL, mujoco.mjtSensor.mjSENS_CONTACT, robot)
+    if model.opt.timestep <= 0:
+        raise UserError(
+            f"arena '{arena}': expected a physics step above 0 s, "
+            f"got {model.opt.timestep:g} s"
+        )
+    ratio = control_step / model.opt.timestep
+    n_substeps = round(ratio)
+    if n_substeps < 1 or abs(ratio - n_substeps) > 1e-8:
+        raise UserError(
+            f"expected a control step that is a multiple of the physics step, "
+            f"{model.opt.timestep:g} s, got {control_step:g} s"
+        )
+    return Scene(
+        model,
+        n_substeps,
+        np.array(wheels),
+        robot,
+        arena,
+        sha256,
+        np.array(distance),
+        contact,
+    )

@@ -1,0 +1,172 @@
+"""Starts: where in an arena of any shape a robot may be put.
+
+Free means that the shell keeps a clearance to everything it can hit; inside means
+that the robot could not be pushed from there to the outside of the walls.
+"""
+
+import copy
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from scipy import ndimage
+
+from epuck_mj.errors import UserError
+from epuck_mj.scene.geometry import box_around, walls
+from epuck_mj.scene.model import Scene
+from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL
+
+NODES_MAX = 400
+"""Most grid nodes along one side of the arena."""
+
+SPACING_MIN = 0.01
+"""Grid spacing [m], unless the arena is larger than NODES_MAX of it."""
+
+START_CLEARANCE = 0.01
+"""Least distance to a wall at a start, if nobody says otherwise [m]. Chosen."""
+
+BLOCK = 64
+"""Candidates drawn at once; part of what a seed means."""
+
+BLOCKS_MAX = 1000
+"""Blocks drawn before giving up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Where a robot fits, on the nodes of a grid over the arena.
+
+    Attributes:
+        lower: corner of the box around the walls, `(2,)` [m].
+        upper: its other corner, `(2,)` [m].
+        origin: of the grid, one shell's width outside of that box, `(2,)` [m].
+        spacing: between nodes [m].
+        free: which nodes are far enough from everything, outside included, `(x, y)`.
+        inside: which of them are enclosed by walls, `(x, y)`.
+    """
+
+    lower: np.ndarray
+    upper: np.ndarray
+    origin: np.ndarray
+    spacing: float
+    free: np.ndarray
+    inside: np.ndarray
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Where the nodes are, `(x, y, 2)` [m]."""
+        return self.origin + self.spacing * np.moveaxis(
+            np.indices(self.free.shape), 0, -1
+        )
+
+    def near_inside(self, points: np.ndarray) -> np.ndarray:
+        """Whether one of the four nodes around points `(n, 2)` is inside, `(n,)`."""
+        low = np.floor((points - self.origin) / self.spacing).astype(int)
+        near = np.zeros(len(points), bool)
+        for corner in np.ndindex(2, 2):
+            near |= self.inside[tuple((low + corner).T)]
+        return near
+
+
+def survey(scene: Scene, clearance: float) -> Grid:
+    """Where a robot fits, whether or not it may start there.
+
+    Args:
+        scene: robot and arena.
+        clearance: least distance from the shell to anything it can hit [m].
+
+    Raises:
+        UserError: if no walls are there.
+    """
+    box = box_around(scene.model, walls(scene.model))
+    if box is None:
+        raise UserError(
+            f"arena '{scene.arena}' has no walls: expected geoms fixed to the "
+            "world that the robot's shell can hit"
+        )
+    lower, upper = box[0][:2], box[1][:2]
+    # one shell's width of outside all around
+    border = 2 * scene.model.geom(SHELL).rbound.item() + clearance
+    size = upper - lower + 2 * border
+    spacing = max(SPACING_MIN, size.max() / NODES_MAX)
+    origin = lower - border
+    nodes = np.ceil(size / spacing).astype(int) + 1
+    shape = int(nodes[0]), int(nodes[1])
+    poses = np.zeros((shape[0] * shape[1], 3))
+    poses[:, :2] = origin + spacing * (np.indices(shape).reshape(2, -1).T)
+    checks = Batch(_with_margin(scene.model, clearance), len(poses), 1)
+    free = _free(checks, scene, poses).reshape(shape)
+    return Grid(lower, upper, origin, spacing, free, enclosed(free))
+
+
+def enclosed(free: np.ndarray) -> np.ndarray:
+    """Which free nodes of a grid `(x, y)` have no way to its edge, `(x, y)`."""
+    parts = np.empty(free.shape, np.int32)
+    ndimage.label(free, output=parts)
+    edge = np.concatenate([parts[0], parts[-1], parts[:, 0], parts[:, -1]])
+    return free & ~np.isin(parts, edge)
+
+
+class FreeSpace:
+    """The poses of a scene where a robot may start."""
+
+    def __init__(self, scene: Scene, clearance: float):
+        """Find the free space, on a grid first.
+
+        Args:
+            scene: robot and arena.
+            clearance: least distance from the shell to anything it can hit [m].
+
+        Raises:
+            UserError: if no walls, no room or no inside is there.
+        """
+        self._scene = scene
+        self._checks = Batch(_with_margin(scene.model, clearance), BLOCK, 1)
+        grid = survey(scene, clearance)
+        if not grid.inside.any():
+            raise UserError(
+                f"arena '{scene.arena}' has no room for a start: its walls "
+                "leave no enclosed space where the robot keeps its start clearance"
+            )
+        self.grid = grid
+
+    def sample(self, rng: np.random.Generator, n: int) -> np.ndarray:
+        """Uniform random starts `(n, 3)`: x, y [m], yaw [rad].
+
+        Raises:
+            UserError: if the free space is too small to be hit.
+        """
+        starts, grid = np.zeros((0, 3)), self.grid
+        for _ in range(BLOCKS_MAX):
+            draws = rng.random((BLOCK, 3))
+            poses = np.empty_like(draws)
+            poses[:, :2] = grid.lower + draws[:, :2] * (grid.upper - grid.lower)
+            poses[:, 2] = np.pi * (2 * draws[:, 2] - 1)
+            poses = poses[grid.near_inside(poses[:, :2])]
+            poses = poses[_free(self._checks, self._scene, poses)]
+            starts = np.concatenate([starts, poses])[:n]
+            if len(starts) == n:
+                return starts
+        raise UserError(
+            f"arena '{self._scene.arena}' has almost no room for a start: "
+            f"{len(starts)} of {n} found among {BLOCK * BLOCKS_MAX} candidates"
+        )
+
+
+def _with_margin(model: mujoco.MjModel, clearance: float) -> mujoco.MjModel:
+    """The model with a shell that already touches at that clearance [m]."""
+    model = copy.copy(model)
+    model.geom_margin[model.geom(SHELL).id] = clearance
+    model.body_margin[model.body(ROBOT_BODY).id] = clearance
+    return model
+
+
+def _free(checks: Batch, scene: Scene, poses: np.ndarray) -> np.ndarray:
+    """Whether the shell touches nothing on each pose `(n, 3)`, `(n,)`."""
+    ids = np.arange(len(poses), dtype=np.int32)
+    checks.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+    checks.bind("qpos")[ids] = scene.qpos(poses)
+    sensordata = checks.bind("sensordata")
+    checks.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)
+    return ~scene.reading(sensordata[ids]).contact

@@ -1,0 +1,1 @@
+"""Pictures, videos, figures and rerun recordings of trials."""

@@ -1,0 +1,37 @@
+"""Pictures as files: in full or not at all, and equal for equal content."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.image import imsave
+
+from epuck_mj.host.files import write_bytes, writing
+
+# matplotlib would name its version
+UNSIGNED = {"Software": None}
+
+
+def save_figure(figure: Figure, path: str | Path, dpi: int = 150) -> None:
+    """Write a figure as PNG.
+
+    Raises:
+        UserError: if it cannot be written.
+    """
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=dpi, metadata=UNSIGNED)
+    with writing():
+        write_bytes(Path(path), content.getvalue())
+
+
+def save_pixels(pixels: np.ndarray, path: str | Path) -> None:
+    """Write pixels `(height, width, 3)`, 0 to 255, as PNG.
+
+    Raises:
+        UserError: if it cannot be written.
+    """
+    content = io.BytesIO()
+    imsave(content, pixels, format="png", metadata={"Software": "epuck_mj"})
+    with writing():
+        write_bytes(Path(path), content.getvalue())

@@ -1,0 +1,110 @@
+"""Rerun recordings: trials to watch. Only this package imports rerun.
+
+One .rrd, blueprint inside: the arena in 3D with every trial's robot, the path that
+grows and the eight proximity rays, beside plots of everything the trajectories hold.
+Several trials share the arena and the clock; their robots do not meet. It makes no
+difference whether a trajectory comes from a simulation or from a robot.
+
+Entities: `arena/*`; per trial `trials/<name>/robot/*`, `path`, `rays`, `crash`, `phase`
+and `signals/*`; `summary`. Timelines: `sim_time` since the start, and `step`.
+"""
+
+import hashlib
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import rerun as rr
+
+from epuck_mj.errors import UserError
+from epuck_mj.host.files import write_bytes, writing
+from epuck_mj.scene.clearance import ClearanceProbe
+from epuck_mj.scene.model import Scene
+from epuck_mj.show.recording.blueprint import blueprint
+from epuck_mj.show.recording.entities import APPLICATION, Entities, entities
+from epuck_mj.show.recording.motion import log_motion
+from epuck_mj.show.recording.shapes import log_arena, log_robot
+from epuck_mj.show.recording.signals import log_signals
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.trials.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A trial to be shown.
+
+    Attributes:
+        name: what a person calls it, short.
+        trajectory: what happened.
+        task: what the trial was.
+    """
+
+    name: str
+    trajectory: Trajectory
+    task: TaskParameters
+
+
+def save_recording(
+    path: str | Path,
+    scene: Scene,
+    trials: Sequence[Trial],
+    title: str,
+    summary: str,
+) -> None:
+    """Write trials as .rrd.
+
+    Args:
+        path: of the file.
+        scene: where the trajectories were recorded, or where they are to be seen.
+        trials: at least one, all on one clock.
+        title: one line, the recording's name.
+        summary: Markdown for the text panel.
+
+    Raises:
+        UserError: if it cannot be written, or nobody can measure clearance here.
+    """
+    probe = ClearanceProbe(scene, 1)
+    places = entities([trial.name for trial in trials])
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "recording.rrd")
+        with rr.RecordingStream(
+            APPLICATION, recording_id=_identity(trials), send_properties=False
+        ) as stream:
+            stream.save(file, default_blueprint=blueprint(scene, trials, places))
+            stream.send_recording_name(title)
+            document = rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN)
+            stream.log("summary", document, static=True)
+            log_arena(stream, scene.model)
+            for trial, place in zip(trials, places, strict=True):
+                _log_trial(stream, scene, probe, trial, place)
+        content = file.read_bytes() if file.exists() else b""
+    # rerun only warns when it is switched off
+    if not content:
+        raise UserError(f"cannot write '{path}': rerun is off, see RERUN")
+    with writing():
+        write_bytes(Path(path), content)
+
+
+def _log_trial(
+    stream: rr.RecordingStream,
+    scene: Scene,
+    probe: ClearanceProbe,
+    trial: Trial,
+    place: Entities,
+) -> None:
+    trajectory = trial.trajectory
+    log_robot(stream, scene.model, place)
+    log_motion(stream, scene, trajectory, trial.task.sensor_range, place)
+    clearance = probe.measure(trajectory.pose).distance
+    log_signals(stream, trajectory, clearance, place)
+
+
+def _identity(trials: Sequence[Trial]) -> str:
+    """The same for the same trials, so that two files of them are one recording."""
+    digest = hashlib.sha256()
+    for trial in trials:
+        digest.update(trial.name.encode())
+        for field in fields(trial.trajectory):
+            digest.update(getattr(trial.trajectory, field.name).tobytes())
+    return digest.hexdigest()[:32]

@@ -1,0 +1,70 @@
+"""Videos: trials as .mp4, drawn by MuJoCo and packed by ffmpeg.
+
+Only here is `imageio_ffmpeg` imported, an extra that brings ffmpeg along.
+"""
+
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from epuck_mj.errors import UserError
+from epuck_mj.host.files import write_bytes, writing
+from epuck_mj.scene.model import Scene
+from epuck_mj.show.render import painter
+from epuck_mj.trials.trajectory import Trajectory
+
+try:
+    import imageio_ffmpeg
+except ModuleNotFoundError as error:
+    raise UserError(
+        f"a video needs '{error.name}', which is not installed: "
+        "pip install 'epuck-mj[video]'"
+    ) from None
+
+FRAME_RATE = 25
+"""Pictures per second; the robot moves between control steps as straight as it can."""
+
+LAST_LOOK = 1.0
+"""How long the end is shown [s]."""
+
+
+def save_video(
+    path: str | Path,
+    scene: Scene,
+    trajectories: Sequence[Trajectory],
+    width: int,
+    height: int,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> None:
+    """Write trials as they happened, in real time.
+
+    Args:
+        path: of the .mp4.
+        scene: where the trajectories were recorded.
+        trajectories: what happened, at least one.
+        width: of the pictures [pixels], even.
+        height: of the pictures [pixels], even.
+        progress: told after every picture how many there are, and of how many.
+
+    Raises:
+        UserError: if no OpenGL is there, or the file cannot be written.
+    """
+    duration = max(trajectory.time[-1] for trajectory in trajectories) + LAST_LOOK
+    times = np.arange(0, duration, 1 / FRAME_RATE)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "video.mp4")
+        with painter(scene, trajectories, width, height, draft=True) as artist:
+            frames = imageio_ffmpeg.write_frames(
+                str(file), (width, height), fps=FRAME_RATE, macro_block_size=2
+            )
+            frames.send(None)
+            try:
+                for i, time in enumerate(times):
+                    frames.send(np.ascontiguousarray(artist.picture(time)))
+                    progress(i + 1, len(times))
+            finally:
+                frames.close()
+        with writing():
+            write_bytes(Path(path), file.read_bytes())

@@ -1,0 +1,1 @@
+"""What a control step does: sensors, motors, fitness, disturbances."""

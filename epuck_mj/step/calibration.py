@@ -1,0 +1,112 @@
+"""Calibration: in what one robot differs from the robot of the books.
+
+Made by `python -m epuck_mj.calibrate`, read by simulation and bridge alike.
+"""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from epuck_mj.constants import N_PROXIMITY, N_WHEELS, TRACK, WHEEL_RADIUS
+from epuck_mj.errors import UserError
+from epuck_mj.host.files import write_text, writing
+from epuck_mj.host.yaml_and_json import read_yaml, to_yaml
+
+GAIN_MAX = 100.0
+"""What no sensor's gain reaches."""
+
+LENGTH_MAX = 1.0
+"""The same of wheel radii and track [m]: millimetres are noticed."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """One robot.
+
+    Attributes:
+        proximity_gains: counts of each sensor against the mean sensor's.
+        wheel_radii: on which the robot rolls, left and right [m].
+        track: effective distance of the wheels [m].
+    """
+
+    proximity_gains: tuple[float, ...] = (1.0,) * N_PROXIMITY
+    wheel_radii: tuple[float, ...] = (WHEEL_RADIUS,) * N_WHEELS
+    track: float = TRACK
+
+    def __post_init__(self) -> None:
+        """Refuse what no robot has."""
+        for name, size in (("proximity_gains", N_PROXIMITY), ("wheel_radii", N_WHEELS)):
+            numbers = getattr(self, name)
+            if not (isinstance(numbers, tuple) and len(numbers) == size):
+                raise ValueError(f"expected {size} {name}, got {numbers!r}")
+        lengths = (*self.wheel_radii, self.track)
+        for numbers, most, unit in (
+            (self.proximity_gains, GAIN_MAX, ""),
+            (lengths, LENGTH_MAX, " m"),
+        ):
+            for number in numbers:
+                real = isinstance(number, int | float) and number is not True
+                if not (real and 0 < number < most):
+                    raise ValueError(
+                        f"expected numbers above 0 and below {most:g}{unit}, "
+                        f"got {number!s:.20}"
+                    )
+
+    @property
+    def gains(self) -> np.ndarray:
+        """Of the proximity sensors, `(8,)`."""
+        return np.array(self.proximity_gains)
+
+    @property
+    def wheel_radius(self) -> float:
+        """Mean of both wheels [m]."""
+        return sum(self.wheel_radii) / N_WHEELS
+
+    def save(self, path: Path) -> None:
+        """Write YAML.
+
+        Raises:
+            UserError: if that is not possible.
+        """
+        # plain floats: YAML knows no numpy
+        content = {
+            "proximity_gains": [float(gain) for gain in self.proximity_gains],
+            "wheel_radii": [float(radius) for radius in self.wheel_radii],
+            "track": float(self.track),
+        }
+        with writing():
+            write_text(path, to_yaml(content))
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Read what `save` wrote.
+
+        Raises:
+            UserError: if the file is missing, damaged or something else.
+        """
+        try:
+            return cls.from_dict(read_yaml(path))
+        except ValueError as error:
+            raise UserError(f"'{path}' is not a calibration: {error}") from None
+
+    @classmethod
+    def from_dict(cls, content: Any) -> Self:
+        """What keys and values say; those missing are the books'.
+
+        Raises:
+            ValueError: if they are no calibration's.
+        """
+        keys = [field.name for field in fields(cls)]
+        if not isinstance(content, dict):
+            raise ValueError(f"expected keys of {', '.join(keys)}")
+        if unknown := [str(key) for key in content if key not in keys]:
+            raise ValueError(
+                f"unknown {', '.join(unknown)}; available: {', '.join(keys)}"
+            )
+        lists_as_tuples: dict[str, Any] = {
+            key: tuple(value) if isinstance(value, list) else value
+            for key, value in content.items()
+        }
+        return cls(**lists_as_tuples)

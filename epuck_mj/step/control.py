@@ -1,0 +1,227 @@
+"""The control step and the trial: the same for one robot and for thousands."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import astuple, dataclass, field
+from typing import Any, Protocol, Self
+
+import numpy as np
+
+from epuck_mj.constants import PROXIMITY_RANGE
+from epuck_mj.step.fitness import (
+    STEP_FITNESS,
+    STEP_FITNESS_MAX,
+    StepFitness,
+    step_fitness,
+)
+from epuck_mj.step.motors import Speeds, command
+from epuck_mj.step.sensors import Reading, observe
+
+STEPS_MAX = 10_000_000
+"""Of a trial: more is a mistake."""
+
+Policy = Callable[[np.ndarray], np.ndarray]
+
+Lost = Callable[[np.ndarray], np.ndarray]
+"""Which trials need not go on, `(trials,)`, given the most each can still reach."""
+
+
+class Robot(Protocol):
+    """Anything that takes wheel speeds and reports what it senses one step later."""
+
+    def step(self, command: np.ndarray) -> Reading:
+        """Drive for one control step; what is sensed at its end."""
+        ...
+
+
+class Robots(Robot, Protocol):
+    """Robots that start where they are put and can be retired one by one."""
+
+    def reset(self, starts: np.ndarray) -> Reading:
+        """Put one robot on each pose `(robots, 3)`: x, y [m], yaw [rad]."""
+        ...
+
+    def keep(self, mask: np.ndarray) -> None:
+        """Go on with those robots, of the ones still active, that `mask` names."""
+        ...
+
+
+@dataclass(frozen=True)
+class TaskParameters:
+    """What a trial is.
+
+    Attributes:
+        steps: control steps of a trial.
+        control_step: duration of a control step [s].
+        fitness: name of the step fitness, `product` or `literal`.
+        sensor_range: where an obstacle stops being seen [m].
+        speeds: what a full action means.
+
+    Source: paper, section 4, where it says; our choices otherwise.
+    """
+
+    steps: int = 300
+    control_step: float = 0.1
+    fitness: str = "product"
+    sensor_range: float = PROXIMITY_RANGE
+    speeds: Speeds = field(default_factory=Speeds)
+
+    @classmethod
+    def from_dict(cls, fields: Mapping[str, Any]) -> Self:
+        """What `dataclasses.asdict` gave, as stored with a controller.
+
+        Raises:
+            ValueError: if the fields are others.
+        """
+        try:
+            task = cls(**{**fields, "speeds": Speeds(**fields["speeds"])})
+            numbers = (task.control_step, task.sensor_range, *astuple(task.speeds))
+            if type(task.steps) is not int or not 0 < task.steps <= STEPS_MAX:
+                raise ValueError(f"expected 1 to {STEPS_MAX} steps, got {task.steps!r}")
+            if not all(0 < number < float("inf") for number in numbers):
+                raise ValueError(f"expected numbers above 0, got {numbers}")
+            if task.fitness not in list(STEP_FITNESS):
+                raise ValueError(f"unknown fitness {task.fitness!r}")
+        except (KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"not the parameters of a task: {error}") from None
+        return task
+
+    @property
+    def step_fitness(self) -> StepFitness:
+        """The step fitness itself."""
+        return step_fitness(self.fitness)
+
+
+@dataclass(frozen=True)
+class ControlStep:
+    """One control step of robots `(...)`: decided, carried out and judged.
+
+    Attributes:
+        action: what the policy decided, `(..., 2)`.
+        command: wheel speeds sent [rad/s], `(..., 2)`.
+        reading: what was sensed after the world moved.
+        observation: the same as network input, `(..., 8)`: the next step's input.
+        fitness: step fitness, `(...)`; 0 in a step that ends in a crash.
+    """
+
+    action: np.ndarray
+    command: np.ndarray
+    reading: Reading
+    observation: np.ndarray
+    fitness: np.ndarray
+
+
+def control_step(
+    robot: Robot, policy: Policy, observation: np.ndarray, task: TaskParameters
+) -> ControlStep:
+    """One control step from `observation` `(..., 8)` on."""
+    action = policy(observation)
+    wheels = command(action, task.speeds)
+    reading = robot.step(wheels)
+    seen = observe(reading.distance, task.sensor_range)
+    # what a step is worth is not for noisy sensors to say
+    judged = seen
+    if reading.truth is not None:
+        judged = observe(reading.truth, task.sensor_range)
+    # a crash stops the calculation: its own step earns nothing
+    fitness = np.where(reading.contact, 0.0, task.step_fitness(action, judged))
+    return ControlStep(action, wheels, reading, seen, fitness)
+
+
+def drive(
+    robot: Robot, policy: Policy, first: Reading, task: TaskParameters
+) -> Iterator[ControlStep]:
+    """The control steps of one robot's trial, ended by a crash or after `task.steps`.
+
+    Args:
+        robot: that has been put on its start.
+        policy: called with what is observed, `(1, 8)`.
+        first: what was sensed there, before anything moved.
+        task: what a trial is.
+    """
+    observation = observe(first.distance, task.sensor_range)
+    for _ in range(task.steps):
+        step = control_step(robot, policy, observation, task)
+        observation = step.observation
+        yield step
+        if step.reading.contact.any():
+            return
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Outcome of `(trials,)` trials.
+
+    Attributes:
+        fitness: sum of the step fitness, `(trials,)`.
+        steps: control steps lived, the crash step included, `(trials,)`.
+        crashed: whether a crash ended the trial, `(trials,)`.
+    """
+
+    fitness: np.ndarray
+    steps: np.ndarray
+    crashed: np.ndarray
+
+
+Seen = Callable[[int, np.ndarray, ControlStep], None]
+"""Told of a control step: its number, which trials `(active,)` it was one of, and what
+came of it for each of them."""
+
+
+class BatchPolicy(Protocol):
+    """A policy with one member per robot, from which members can be picked."""
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """Actions `(robots, 2)` for observations `(robots, 8)`."""
+        ...
+
+    def __getitem__(self, index: np.ndarray | slice) -> "BatchPolicy":
+        """The members that a mask `(robots,)` or a slice names."""
+        ...
+
+
+def run_trials(
+    robots: Robots,
+    policy: BatchPolicy,
+    starts: np.ndarray,
+    task: TaskParameters,
+    lost: Lost | None = None,
+    seen: Seen | None = None,
+) -> Trials:
+    """One trial per start; a robot that crashes is not stepped again.
+
+    Args:
+        robots: to put on the starts.
+        policy: one member per start.
+        starts: poses `(trials, 3)`: x, y [m], yaw [rad].
+        task: what a trial is.
+        lost: asked after every step which trials to break off, uncrashed, with what
+            they have earned so far; None lets all of them live.
+        seen: told of every step; None if nobody watches.
+    """
+    n_trials = len(starts)
+    fitness = np.zeros(n_trials)
+    steps = np.zeros(n_trials, int)
+    crashed = np.zeros(n_trials, bool)
+    active = np.arange(n_trials)
+    observation = observe(robots.reset(starts).distance, task.sensor_range)
+    for k in range(task.steps):
+        step = control_step(robots, policy, observation, task)
+        observation = step.observation
+        if seen is not None:
+            seen(k, active, step)
+        fitness[active] += step.fitness
+        steps[active] += 1
+        alive = ~step.reading.contact
+        crashed[active] = ~alive
+        if lost is not None:
+            most = fitness.copy()
+            most[active[alive]] += (task.steps - 1 - k) * STEP_FITNESS_MAX
+            alive &= ~lost(most)[active]
+        # those who are done leave; everything kept per robot follows
+        if not alive.all():
+            active, observation = active[alive], observation[alive]
+            if not active.size:
+                break
+            policy = policy[alive]
+            robots.keep(alive)
+    return Trials(fitness, steps, crashed)

@@ -1,0 +1,211 @@
+"""Disturbances: in what a robot and its day differ from the robot of the books.
+
+Plain arrays, drawn before a trial begins: so a trial in them can be repeated, and all
+individuals of a generation can meet the same ones.
+"""
+
+from dataclasses import dataclass, fields, replace
+from typing import Self
+
+import numpy as np
+
+from epuck_mj.constants import (
+    N_PROXIMITY,
+    N_WHEELS,
+    PROXIMITY_PERIOD,
+    TRACK,
+    WHEEL_RADIUS,
+)
+from epuck_mj.step.calibration import Calibration
+
+
+@dataclass(frozen=True)
+class Noise:
+    """How strongly a robot is disturbed while it drives.
+
+    Attributes:
+        counts: standard deviation of proximity counts, in units of the published one.
+        wheels: relative standard deviation of a wheel's speed in a control step.
+        age: of the oldest proximity reading [s].
+    """
+
+    counts: float
+    wheels: float
+    age: float = PROXIMITY_PERIOD
+
+
+NOISE: dict[str, Noise | None] = {
+    "none": None,
+    "calibrated": Noise(counts=1.0, wheels=0.03),
+    "strong": Noise(counts=3.0, wheels=0.06),
+}
+"""Levels by name; without noise, sensors and motors are the paper's ideal ones.
+
+Source: counts as measured on real robots (`PROXIMITY_COUNT_NOISE`); wheels as in Enki,
+whose uniform 5 % have a standard deviation of 3 %.
+"""
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """From where to where robots differ, lowest and highest.
+
+    Attributes:
+        gain: counts of a proximity sensor against the mean one's.
+        wheel_radius: [m].
+        track: effective distance of the wheels [m].
+        mass: against the robot's own.
+        friction: of wheels and floor, against the robot's own.
+        latency: control steps until a command has reached the wheels.
+    """
+
+    gain: tuple[float, float] = (1.0, 1.0)
+    wheel_radius: tuple[float, float] = (WHEEL_RADIUS, WHEEL_RADIUS)
+    track: tuple[float, float] = (TRACK, TRACK)
+    mass: tuple[float, float] = (1.0, 1.0)
+    friction: tuple[float, float] = (1.0, 1.0)
+    latency: tuple[int, int] = (0, 0)
+
+
+BOOK = Ranges()
+"""All robots are the one of the books."""
+
+RANGES = Ranges(
+    gain=(0.6, 1.5),
+    wheel_radius=(0.0200, 0.0207),
+    track=(0.051, 0.057),
+    mass=(0.93, 1.07),
+    friction=(0.7, 1.2),
+    latency=(0, 3),
+)
+"""Of randomised robots.
+
+Source: gains of JBotEvolver's eight sensors; wheel radii of Webots and of ARGoS, as
+driven; tracks of Enki and of a fit for ROS 2. Mass, friction and latency are chosen.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbances:
+    """What `(n,)` trials meet; several may meet the same, one of `(k,)`.
+
+    Attributes:
+        of: which of the `k` each trial meets, `(n,)`.
+        gains: of the proximity sensors, `(k, 8)`.
+        known_gains: what those who read the sensors take for their gains, `(k, 8)`.
+        age: of their readings at the end of a control step [s], `(k, 8)`.
+        count_noise: of each reading, in published standard deviations,
+            `(k, steps + 1, 8)`.
+        wheel_gains: of the wheels' speeds, `(k, 2)`: radii, and what else lasts.
+        turn_gain: of the robot's turns, `(k,)`: the track.
+        wheel_noise: of the wheels' speeds in each control step, `(k, steps, 2)`.
+        latency: control steps until a command has reached the wheels, `(k,)`, int.
+        mass: of the robot against its own, `(k,)`.
+        friction: of its wheels against their own, `(k,)`.
+    """
+
+    of: np.ndarray
+    gains: np.ndarray
+    known_gains: np.ndarray
+    age: np.ndarray
+    count_noise: np.ndarray
+    wheel_gains: np.ndarray
+    turn_gain: np.ndarray
+    wheel_noise: np.ndarray
+    latency: np.ndarray
+    mass: np.ndarray
+    friction: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Refuse arrays that do not belong together."""
+        k, steps = self.wheel_noise.shape[:2]
+        expected = {
+            "gains": (k, N_PROXIMITY),
+            "known_gains": (k, N_PROXIMITY),
+            "age": (k, N_PROXIMITY),
+            "count_noise": (k, steps + 1, N_PROXIMITY),
+            "wheel_gains": (k, N_WHEELS),
+            "turn_gain": (k,),
+            "wheel_noise": (k, steps, N_WHEELS),
+            "latency": (k,),
+            "mass": (k,),
+            "friction": (k,),
+        }
+        for name, shape in expected.items():
+            if (got := getattr(self, name).shape) != shape:
+                raise ValueError(f"expected {name} of shape {shape}, got {got}")
+
+    def __len__(self) -> int:
+        """Number of trials."""
+        return len(self.of)
+
+    def __getitem__(self, index: np.ndarray | slice) -> Self:
+        """Those of some trials, in numpy's sense."""
+        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
+        return type(self)(**{**arrays, "of": self.of[index]})
+
+    def tiled(self, times: int) -> Self:
+        """The same for each of `times` individuals, one after the other."""
+        return self[np.tile(np.arange(len(self)), times)]
+
+
+def draw(
+    rng: np.random.Generator,
+    n: int,
+    steps: int,
+    noise: Noise,
+    ranges: Ranges = BOOK,
+) -> Disturbances:
+    """Disturbances of `n` trials, each its own.
+
+    Args:
+        rng: where they come from.
+        n: number of trials.
+        steps: control steps of a trial.
+        noise: how strong.
+        ranges: how robots differ.
+    """
+    low, high = np.log(ranges.gain)
+    return Disturbances(
+        of=np.arange(n),
+        # a sensor that is twice as strong is as likely as one half as strong
+        gains=np.exp(rng.uniform(low, high, (n, N_PROXIMITY))),
+        known_gains=np.ones((n, N_PROXIMITY)),
+        age=rng.uniform(0, noise.age, (n, N_PROXIMITY)),
+        count_noise=noise.counts * rng.standard_normal((n, steps + 1, N_PROXIMITY)),
+        wheel_gains=rng.uniform(*ranges.wheel_radius, (n, N_WHEELS)) / WHEEL_RADIUS,
+        turn_gain=TRACK / rng.uniform(*ranges.track, n),
+        wheel_noise=noise.wheels * rng.standard_normal((n, steps, N_WHEELS)),
+        latency=rng.integers(ranges.latency[0], ranges.latency[1] + 1, n),
+        mass=rng.uniform(*ranges.mass, n),
+        friction=rng.uniform(*ranges.friction, n),
+    )
+
+
+def calibrated(
+    calibration: Calibration,
+    rng: np.random.Generator,
+    n: int,
+    steps: int,
+    noise: Noise,
+) -> Disturbances:
+    """Disturbances of `n` trials of one robot, of which we know in what it differs.
+
+    As on the bridge, its sensors' gains are undone, and its wheels' are not.
+
+    Args:
+        calibration: of that robot.
+        rng: where its noise comes from.
+        n: number of trials.
+        steps: control steps of a trial.
+        noise: how strong.
+    """
+    gains = np.tile(calibration.gains, (n, 1))
+    wheels = np.array(calibration.wheel_radii) / WHEEL_RADIUS
+    return replace(
+        draw(rng, n, steps, noise),
+        gains=gains,
+        known_gains=gains,
+        wheel_gains=np.tile(wheels, (n, 1)),
+        turn_gain=np.full(n, TRACK / calibration.track),
+    )

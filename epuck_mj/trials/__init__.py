@@ -1,0 +1,1 @@
+"""What happened in trials: recorded, measured, put into classes."""

@@ -1,0 +1,91 @@
+"""Behaviour classes: each trial gets one name for what the robot did in it.
+
+The first class of the table that fits is the trial's. Failures come first: a robot
+that ends in a wall or in a corner is no wall follower, however well it began. Then
+come those that follow walls, then those that do something else.
+"""
+
+from collections.abc import Callable
+from types import MappingProxyType
+
+import numpy as np
+
+from epuck_mj.constants import BODY_RADIUS, PROXIMITY_RANGE
+from epuck_mj.trials.metrics import (
+    FOLLOWING_SHARE,
+    FOLLOWING_SPEED,
+    FOLLOWING_TIME,
+    LAST_TIME,
+    Behaviour,
+)
+
+SPOT = BODY_RADIUS
+"""Farthest that a robot on the spot gets [m]: it still stands where it stood."""
+
+ROUND = 2 * np.pi
+"""Least turn of spinners and circlers [rad]: all the way round once."""
+
+CIRCLER_NEAR_WALL = 0.5
+"""Largest share near walls of a circler: it circles in the open."""
+
+HUG = 0.005
+"""Clearance below which a follower hugs [m]: less than a real robot's errors."""
+
+BOUNCES = 3
+"""Least visits of a bouncer: one is an odd start, another one the end of a search."""
+
+OTHER = "other"
+
+CLASSES: MappingProxyType[str, Callable[[Behaviour], np.ndarray]] = MappingProxyType(
+    {
+        # whatever went before
+        "crashed": lambda b: b.crashed,
+        # all its life on one spot, turning
+        "spinner": lambda b: (b.reach < SPOT) & (np.abs(b.turn) >= ROUND),
+        # at last on one spot: in a corner, before a wall, or from the start on
+        "stuck": lambda b: b.reach_at_end < SPOT,
+        # a wall follower that rides where a real robot would scrape
+        "hugger": lambda b: b.follows & (b.clearance_mean < HUG),
+        "wall follower": lambda b: b.follows,
+        # round and round, no more than one visit to a wall each time
+        "circler": lambda b: (
+            (np.abs(b.turn_in_open) >= ROUND)
+            & (b.share_near_wall < CIRCLER_NEAR_WALL)
+            & (b.visits <= np.abs(b.turn) / ROUND + 1)
+        ),
+        # from wall to wall
+        "bouncer": lambda b: b.visits >= BOUNCES,
+        # met no wall, or too late to tell what it does there
+        "searcher": lambda b: ~(b.time - b.time_to_first_wall >= FOLLOWING_TIME),
+    }
+)
+"""Name and predicate of each class, in order of precedence; `other` fits the rest."""
+
+MEANINGS: MappingProxyType[str, str] = MappingProxyType(
+    {
+        "crashed": "the shell touched a wall, whatever went before",
+        "spinner": f"turned on one spot of {SPOT * 1000:.0f} mm all its life",
+        "stuck": f"stayed on such a spot for its last {LAST_TIME:.0f} s",
+        "hugger": f"a wall follower with a mean clearance below {HUG * 1000:.0f} mm",
+        "wall follower": f"within {PROXIMITY_RANGE * 1000:.0f} mm of walls in "
+        f"{FOLLOWING_SHARE:.0%} of the time from the first on, {FOLLOWING_TIME:.0f} s "
+        f"at least, making way along them at {FOLLOWING_SPEED:.0%} of the top speed",
+        "circler": "went round in the open, which walls only touch",
+        "bouncer": f"from wall to wall, {BOUNCES} visits at least",
+        "searcher": "met no wall, or too late to tell what it does there",
+        OTHER: "none of these",
+    }
+)
+"""The same in words, for readers."""
+
+
+def behaviour_classes(behaviour: Behaviour) -> np.ndarray:
+    """Name of the class of each trial, `(n,)`."""
+    masks = [fits(behaviour) for fits in CLASSES.values()]
+    return np.select(masks, list(CLASSES), OTHER)
+
+
+def class_shares(behaviour: Behaviour) -> dict[str, float]:
+    """Share of the trials that each class has, in order of precedence; sums to 1."""
+    classes = behaviour_classes(behaviour)
+    return {name: float((classes == name).mean()) for name in (*CLASSES, OTHER)}

@@ -1,0 +1,170 @@
+"""Trajectories: all that one robot did and sensed in one trial, as plain arrays.
+
+The neutral record of a trial, stored as .npz; figures and recordings are views of it.
+"""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from epuck_mj.constants import N_PROXIMITY
+from epuck_mj.errors import UserError
+from epuck_mj.host.files import read_arrays, write_arrays, writing
+from epuck_mj.policies.network import Controller
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.scene.model import Scene
+from epuck_mj.step.control import Policy, TaskParameters, drive
+from epuck_mj.step.sensors import observe, proximity
+
+FORMAT = "epuck_mj.trajectory/2"
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """One trial of one robot, `T` control steps; row 0 is the start.
+
+    `action[k]` was decided on `observation[k]`, earned `fitness[k]` and led to row
+    `k + 1` of what is sensed.
+
+    Attributes:
+        time: since the start [s], `(T + 1,)`.
+        pose: where the robot was, `(T + 1, 3)`: x, y [m], yaw [rad].
+        distance: along each proximity ray [m], negative where nothing was hit,
+            `(T + 1, 8)`.
+        proximity: counts of each proximity sensor, `(T + 1, 8)`.
+        observation: what the policy saw of it, in [0, 1], `(T + 1, 8)`.
+        contact: whether the shell touched a wall, `(T + 1,)`, bool.
+        hidden: output of the hidden neurons in [0, 1], `(T, hidden)`; of a policy
+            that has none, `(T, 0)`.
+        action: what the policy decided, `(T, 2)`: v in [0, 1], w in [-1, 1].
+        command: wheel speeds sent, left and right [rad/s], `(T, 2)`.
+        fitness: step fitness, `(T,)`.
+    """
+
+    time: np.ndarray
+    pose: np.ndarray
+    distance: np.ndarray
+    proximity: np.ndarray
+    observation: np.ndarray
+    contact: np.ndarray
+    hidden: np.ndarray
+    action: np.ndarray
+    command: np.ndarray
+    fitness: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Refuse arrays that do not belong together."""
+        steps = self.fitness.size
+        expected = {
+            "time": (float, (steps + 1,)),
+            "pose": (float, (steps + 1, 3)),
+            "distance": (float, (steps + 1, N_PROXIMITY)),
+            "proximity": (float, (steps + 1, N_PROXIMITY)),
+            "observation": (float, (steps + 1, N_PROXIMITY)),
+            "contact": (bool, (steps + 1,)),
+            "hidden": (float, (steps, *self.hidden.shape[-1:])),
+            "action": (float, (steps, 2)),
+            "command": (float, (steps, 2)),
+            "fitness": (float, (steps,)),
+        }
+        for name, (dtype, shape) in expected.items():
+            got = getattr(self, name)
+            if got.dtype != dtype or got.shape != shape:
+                raise ValueError(
+                    f"expected {name} of type {np.dtype(dtype)} and shape {shape}, "
+                    f"got {got.dtype} {got.shape}"
+                )
+
+    @property
+    def steps(self) -> int:
+        """Control steps lived, the crash step included."""
+        return self.fitness.size
+
+    @property
+    def crashed(self) -> bool:
+        """Whether a crash ended the trial."""
+        return bool(self.contact[-1])
+
+    @property
+    def cumulative_fitness(self) -> np.ndarray:
+        """Step fitness summed up to each step, `(T,)`, in the order of the steps."""
+        return np.cumsum(self.fitness)
+
+    @property
+    def trial_fitness(self) -> float:
+        """Sum of the step fitness: to the last bit what `run_trials` reports."""
+        return float(self.cumulative_fitness[-1]) if self.steps else 0.0
+
+    def save(self, path: str | Path) -> None:
+        """Write an .npz; equal trajectories make equal files.
+
+        Raises:
+            UserError: if it cannot be written.
+        """
+        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
+        with writing():
+            write_arrays(Path(path), {"format": np.array(FORMAT), **arrays})
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read what `save` wrote.
+
+        Raises:
+            UserError: if the file is missing, damaged or something else.
+        """
+        arrays = read_arrays(Path(path))
+        try:
+            if str(arrays.pop("format", "")) != FORMAT:
+                raise ValueError(f"expected format '{FORMAT}'")
+            return cls(**arrays)
+        except (TypeError, ValueError) as error:
+            raise UserError(f"'{path}' is not a trajectory file: {error}") from None
+
+
+def record(
+    scene: Scene, policy: Policy, start: np.ndarray, task: TaskParameters
+) -> Trajectory:
+    """One trial, ended by a crash or after `task.steps`.
+
+    Args:
+        scene: robot and arena.
+        policy: called with observations `(1, 8)`, gives actions `(1, 2)`.
+        start: pose `(3,)`: x, y [m], yaw [rad].
+        task: what a trial is.
+    """
+    robots = SimulatedRobots(scene, 1, 1)
+    first = robots.reset(np.asarray(start, float)[None])
+    poses, steps = [robots.poses()], []
+    for step in drive(robots, policy, first, task):
+        poses.append(robots.poses())
+        steps.append(step)
+    readings = [first, *(step.reading for step in steps)]
+    distance = np.concatenate([reading.distance for reading in readings])
+    seen = observe(distance, task.sensor_range)
+    return Trajectory(
+        time=np.arange(len(poses)) * task.control_step,
+        pose=np.concatenate(poses),
+        distance=distance,
+        proximity=np.rint(proximity(distance)),
+        observation=seen,
+        contact=np.concatenate([reading.contact for reading in readings]),
+        hidden=hidden_outputs(policy, seen[:-1]),
+        action=np.concatenate([step.action for step in steps]),
+        command=np.concatenate([step.command for step in steps]),
+        fitness=np.concatenate([step.fitness for step in steps]),
+    )
+
+
+def hidden_outputs(policy: Policy, observations: np.ndarray) -> np.ndarray:
+    """What was inside a policy, `(T, hidden)`: of one without a network, `(T, 0)`.
+
+    Args:
+        policy: that saw the observations, one after the other.
+        observations: `(T, 8)`.
+    """
+    if isinstance(policy, Controller):
+        # bit for bit: it acts the same alone and in a crowd
+        return policy.activation(observations)
+    return np.zeros((len(observations), 0))

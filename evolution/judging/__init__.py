@@ -1,0 +1,1 @@
+"""What a genome is worth: evaluation, held-out tests, scores."""

@@ -1,0 +1,227 @@
+"""Genomes to fitness: every individual of a generation lives the same trials.
+
+Two engines with the same bits: `batch` steps all robots at once on
+`mujoco.batch.Batch`; `dm_control` steps the dm_control task, one trial after another.
+
+Racing: an individual that only matters if it beats a known fitness is broken off as
+soon as it no longer can, since no control step is worth more than 1. Whoever beats
+what it has to has lived all its trials, so no comparison comes out differently.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from epuck_mj.environments.dm_control import FollowWalls, environment
+from epuck_mj.policies.network import Controller, Network
+from epuck_mj.rungs.disturbed import disturbed
+from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.scene.model import Scene
+from epuck_mj.step.control import TaskParameters, Trials, run_trials
+from epuck_mj.step.disturbances import Disturbances
+
+CAPACITY = 512
+"""Robots simulated at once: changes no result. More of them leave the cache.
+
+An individual with more trials is not raced.
+"""
+
+ROUNDING = 1e-9
+"""By how much an individual must have lost its race: sums of floats are inexact."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Trials of `(individuals,)` genomes on `(trials,)` starts.
+
+    Of an individual that lost its race they are what they were when it was broken off.
+
+    Attributes:
+        trial_fitness: sum of the step fitness, `(individuals, trials)`.
+        steps: control steps lived, `(individuals, trials)`.
+        crashed: whether a crash ended the trial, `(individuals, trials)`.
+    """
+
+    trial_fitness: np.ndarray
+    steps: np.ndarray
+    crashed: np.ndarray
+
+    @property
+    def fitness(self) -> np.ndarray:
+        """Mean over the trials, `(individuals,)`. Source: paper, section 4."""
+        return self.trial_fitness.mean(axis=-1)
+
+
+@dataclass(frozen=True)
+class Race:
+    """What individuals `(individuals,)` have to beat; their trials follow one another.
+
+    Attributes:
+        to_beat: fitness to exceed, -inf where every fitness matters.
+        trials: of each individual.
+    """
+
+    to_beat: np.ndarray
+    trials: int
+
+    def lost(self, most: np.ndarray) -> np.ndarray:
+        """Which trials `(individuals * trials,)` need not go on.
+
+        Args:
+            most: what each of them can still reach.
+        """
+        fitness = most.reshape(-1, self.trials).mean(axis=-1)
+        return np.repeat(fitness < self.to_beat - ROUNDING, self.trials)
+
+    def __getitem__(self, chunk: slice) -> "Race":
+        """The race of the individuals whose trials a slice holds."""
+        first, last = chunk.start // self.trials, chunk.stop // self.trials
+        return Race(self.to_beat[first:last], self.trials)
+
+
+@dataclass(frozen=True)
+class Work:
+    """Trials `(n,)` to be lived.
+
+    Attributes:
+        controller: one per trial.
+        starts: poses `(n, 3)`: x, y [m], yaw [rad].
+        race: which trials may be broken off; None if none may.
+        disturbances: of the trials; None for ideal robots.
+    """
+
+    controller: Controller
+    starts: np.ndarray
+    race: Race | None = None
+    disturbances: Disturbances | None = None
+
+    def __len__(self) -> int:
+        """Number of trials."""
+        return len(self.starts)
+
+    def __getitem__(self, chunk: slice) -> "Work":
+        """Some of the trials; in a race, of whole individuals."""
+        race, met = self.race, self.disturbances
+        return Work(
+            self.controller[chunk],
+            self.starts[chunk],
+            None if race is None else race[chunk],
+            None if met is None else met[chunk],
+        )
+
+    def chunks(self, most: int) -> Iterator["Work"]:
+        """The same in parts of at most so many trials.
+
+        Individuals that race stay whole: they win or lose by all their trials.
+        """
+        whole = 1 if self.race is None else self.race.trials
+        size = max(whole, most - most % whole)
+        for first in range(0, len(self), size):
+            yield self[first : min(first + size, len(self))]
+
+
+class Engine(Protocol):
+    """Runs one trial per member of a batch of controllers."""
+
+    def run(self, work: Work) -> Trials:
+        """Outcome of `(n,)` trials."""
+        ...
+
+
+class BatchEngine:
+    """All trials at once, on threads."""
+
+    def __init__(self, scene: Scene, task: TaskParameters, threads: int = 0):
+        """Allocate the robots; `threads` 0 is one per core."""
+        self._task = task
+        self._robots = SimulatedRobots(scene, CAPACITY, threads)
+
+    def run(self, work: Work) -> Trials:
+        """See `Engine.run`."""
+        if work.race is not None and work.race.trials > self._robots.capacity:
+            # an individual does not fit: nobody is broken off
+            work = replace(work, race=None)
+        parts = [
+            run_trials(
+                disturbed(self._robots, part.disturbances, self._task.control_step),
+                part.controller,
+                part.starts,
+                self._task,
+                None if part.race is None else part.race.lost,
+            )
+            for part in work.chunks(self._robots.capacity)
+        ]
+        return joined(parts)
+
+
+class DmControlEngine:
+    """One trial after the other, on the dm_control task itself."""
+
+    def __init__(self, scene: Scene, task: TaskParameters):
+        """Remember the scene; an environment lives as long as a call of `run`."""
+        self._scene = scene
+        self._task = task
+
+    def run(self, work: Work) -> Trials:
+        """See `Engine.run`; every trial is lived to its end, by an ideal robot.
+
+        Raises:
+            ValueError: if there are disturbances.
+        """
+        if work.disturbances is not None:
+            raise ValueError("expected no disturbances: dm_control has ideal robots")
+        task = FollowWalls(self._scene, self._task, starts=work.starts)
+        env, n = environment(self._scene, task), len(work)
+        fitness, steps = np.zeros(n), np.zeros(n, int)
+        crashed = np.zeros(n, bool)
+        for i in range(n):
+            policy, time_step = work.controller[i], env.reset()
+            while not time_step.last():
+                time_step = env.step(policy(time_step.observation["proximity"]))
+                fitness[i] += time_step.reward
+                steps[i] += 1
+            crashed[i] = task.crashed(env.physics)
+        return Trials(fitness, steps, crashed)
+
+
+def evaluate(
+    engine: Engine,
+    network: Network,
+    genomes: np.ndarray,
+    starts: np.ndarray,
+    to_beat: np.ndarray | None = None,
+    disturbances: Disturbances | None = None,
+) -> Evaluation:
+    """All individuals on all starts.
+
+    Args:
+        engine: what runs the trials.
+        network: shape of the genomes.
+        genomes: `(individuals, genes)`.
+        starts: poses `(trials, 3)`, x, y [m], yaw [rad]: the same for everybody.
+        to_beat: fitness `(individuals,)` below which nobody cares how far below;
+            None if every fitness matters.
+        disturbances: of the trials, the same for everybody; None for ideal robots.
+    """
+    shape = (len(genomes), len(starts))
+    controller = network.decode(np.repeat(genomes, len(starts), axis=0))
+    race = None if to_beat is None else Race(to_beat, len(starts))
+    everybody = None if disturbances is None else disturbances.tiled(len(genomes))
+    everywhere = np.tile(starts, (len(genomes), 1))
+    trials = engine.run(Work(controller, everywhere, race, everybody))
+    return Evaluation(
+        trials.fitness.reshape(shape),
+        trials.steps.reshape(shape),
+        trials.crashed.reshape(shape),
+    )
+
+
+def joined(parts: Sequence[Trials]) -> Trials:
+    """The trials of all parts, in their order."""
+    return Trials(
+        np.concatenate([part.fitness for part in parts]),
+        np.concatenate([part.steps for part in parts]),
+        np.concatenate([part.crashed for part in parts]),
+    )

@@ -1,0 +1,36 @@
+"""Fresh starts: on which champions are chosen, and those on which they are tested.
+
+Both sets are fixed, the same for all runs, and never used in evolution.
+"""
+
+import numpy as np
+
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.disturbances import Disturbances
+from evolution.settings.randomness import Purpose, disturbances, random_generator
+from evolution.settings.setting import Conditions
+
+HELD_OUT_SEED = 0
+"""Seed of validation and test starts: no run's seed reaches their streams."""
+
+N_VALIDATION = 200
+
+N_TEST = 1000
+
+
+def starts_for_validation(space: FreeSpace) -> np.ndarray:
+    """The starts on which champions are chosen, `(200, 3)`."""
+    rng = random_generator(HELD_OUT_SEED, Purpose.VALIDATION)
+    return space.sample(rng, N_VALIDATION)
+
+
+def starts_for_test(space: FreeSpace, n: int = N_TEST) -> np.ndarray:
+    """The first `n` of the starts on which champions are reported, `(n, 3)`."""
+    return space.sample(random_generator(HELD_OUT_SEED, Purpose.TEST), n)
+
+
+def held_out_disturbances(
+    conditions: Conditions, purpose: Purpose, n: int, steps: int
+) -> Disturbances | None:
+    """What champions meet in `n` trials of `steps`; in fewer, something else."""
+    return disturbances(conditions, n, steps, HELD_OUT_SEED, purpose)

@@ -1,0 +1,1 @@
+"""Building blocks of pages: Markdown, HTML, figure style, words."""

@@ -1,0 +1,101 @@
+"""Numbers of a report as a person reads them, and what may be said of them."""
+
+import math
+import shlex
+from types import MappingProxyType
+
+import numpy as np
+
+from evolution.statistics.samples import FEWEST_FOR_INTERVAL, quartiles
+
+LABELS: MappingProxyType[str, str] = MappingProxyType(
+    {
+        "de-best": "DE/best/1/bin",
+        "de-rand": "DE/rand/1/bin",
+        "ga": "GA",
+        "cma-es": "CMA-ES",
+        "one-plus-one-es": "(1+1)-ES",
+        "random-search": "random search",
+    }
+)
+"""Names of shipped experiments; any other is called by its own."""
+
+PAPERS = ("de-best", "de-rand", "ga")
+"""The experiments of the paper."""
+
+ROBOTS: MappingProxyType[str, str] = MappingProxyType(
+    {"epuck_planar": "planar robot", "epuck": "wheeled robot"}
+)
+
+YARDSTICK_LABEL = "hand-written wall follower"
+
+NOTHING = "-"
+"""Stands for what is not known."""
+
+
+def label(experiment: str) -> str:
+    """An experiment's name for readers."""
+    return LABELS.get(experiment, experiment)
+
+
+def robot_name(robot: str) -> str:
+    """A robot's name for readers."""
+    return ROBOTS.get(robot, robot)
+
+
+SPREAD = f"Median [quartiles] over runs (below {FEWEST_FOR_INTERVAL}: every run)"
+"""What `spread` writes."""
+
+
+def spread(sample: np.ndarray, scale: float = 1.0, form: str = "z.1f") -> str:
+    """Median and quartiles of `(n,)`; of few values, which have none, all of them."""
+    if not sample.size:
+        return NOTHING
+    if sample.size == 1:
+        return f"{sample[0] * scale:{form}} (n = 1)"
+    found = quartiles(sample * scale)
+    if sample.size < FEWEST_FOR_INTERVAL:
+        return f"{found.median:{form}} ({_listed(sample * scale, form)})"
+    return f"{found.median:{form}} [{found.lower:{form}}, {found.upper:{form}}]"
+
+
+def _listed(sample: np.ndarray, form: str) -> str:
+    return ", ".join(f"{value:{form}}" for value in np.sort(sample))
+
+
+def median_and_quartiles(sample: np.ndarray, unit: str = "") -> str:
+    """The same for a sentence."""
+    found = quartiles(sample)
+    text = f"median {found.median:.1f}{unit}"
+    if sample.size == 1:
+        return text
+    if sample.size < FEWEST_FOR_INTERVAL:
+        return f"{text} ({_listed(sample, '.1f')})"
+    return f"{text} (quartiles {found.lower:.1f} and {found.upper:.1f})"
+
+
+def between(low: float, high: float, form: str = ".2f") -> str:
+    """An interval, or that there is none."""
+    if math.isnan(low) or math.isnan(high):
+        return "(too few runs for an interval)"
+    return f"[{low:{form}}, {high:{form}}]"
+
+
+def percent(share: float | None) -> str:
+    """A share in percent."""
+    return NOTHING if share is None else f"{share:.1%}"
+
+
+def probability(p: float) -> str:
+    """A p value with its sign of equality."""
+    return "< 0.001" if p < 0.001 else f"= {p:.3f}"
+
+
+def evaluations(n: float | None) -> str:
+    """A number of evaluations."""
+    return NOTHING if n is None else f"{n:,.0f}"
+
+
+def command_line(module: str, *arguments: str) -> str:
+    """The line that runs a module of ours, the same wherever the report is made."""
+    return shlex.join(["python", "-m", module, *arguments])

@@ -1,0 +1,1 @@
+"""The paper's claims with verdicts: `python -m evolution.reproduce`."""

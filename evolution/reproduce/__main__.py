@@ -1,0 +1,101 @@
+"""The whole study by one command: `python -m evolution.reproduce [--quick | --full]`.
+
+Runs the study, reports it, and holds each of the paper's claims against it.
+"""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from epuck_mj.errors import UserError
+from epuck_mj.host import files
+from epuck_mj.host.command_line import command, main, parse
+from epuck_mj.step.fitness import STEP_FITNESS
+from evolution.report.__main__ import report
+from evolution.reproduce.document import reproduction
+from evolution.reproduce.first_generation import first_generation
+from evolution.study.__main__ import study
+from evolution.study.data import load_study
+
+MODULE = "evolution.reproduce"
+
+QUICK = (("quick", "1-3"),)
+FULL = (("paper", "1-30"), ("wheels", "1-3"))
+"""Studies and their seeds."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Redo the paper's comparison, and say which of its claims hold.
+
+    Writes studies, reports and REPRODUCTION.md; call it again to go on.
+
+    Attributes:
+        quick: three seeds and a twentieth of the budget: ten minutes on two cores.
+            Shows that everything works, and no more.
+        full: 30 seeds, and 3 evolved on wheels: days on two cores.
+        output: directory of it all.
+        study: run nothing; write what this study directory says into --output.
+        wheels: with --study, the study directory of runs evolved on wheels.
+    """
+
+    quick: bool = False
+    full: bool = False
+    output: Path = Path("runs/reproduction")
+    study: Path | None = None
+    wheels: Path | None = None
+
+
+def reproduce(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status.
+
+    Raises:
+        UserError: for anything the user can put right.
+    """
+    options = parse(Options, f"python -m {MODULE}", argv)
+    if [options.quick, options.full, options.study is not None].count(True) > 1:
+        raise UserError("expected one of --quick, --full and --study")
+    if options.wheels is not None:
+        if options.study is None:
+            raise UserError("expected --study with --wheels")
+        if options.wheels.name == options.study.name:
+            raise UserError(
+                f"expected studies in folders of different names, got "
+                f"'{options.study}' and '{options.wheels}'"
+            )
+    if options.study is not None:
+        places, failed = [options.study, options.wheels], 0
+    else:
+        places, failed = [], 0
+        for name, seeds in FULL if options.full else QUICK:
+            place = options.output / name
+            status = study([name, "--seeds", seeds, "--output", str(place)])
+            # 1: some runs failed, the others can be reported
+            if status > 1:
+                return status
+            failed = max(failed, status)
+            places.append(place)
+    studies = [load_study(place) for place in filter(None, places)]
+    for place in filter(None, places):
+        report([str(place), "--output", str(options.output / f"report-{place.name}")])
+    main_study, *others = studies
+    config = next(iter(main_study.configs.values()))
+    try:
+        unevolved = [first_generation(config, name) for name in STEP_FITNESS]
+    except UserError as error:
+        # the arena of another machine; all else can be shown
+        print(f"missing: the first generation: {error}", file=sys.stderr)
+        unevolved = []
+    wheels = others[0] if others else None
+    text = reproduction(main_study, wheels, unevolved, command(MODULE, *argv))
+    path = options.output / "REPRODUCTION.md"
+    with files.writing():
+        options.output.mkdir(parents=True, exist_ok=True)
+        files.write_text(path, text)
+    print(f"Written: {path}")
+    return failed
+
+
+if __name__ == "__main__":
+    main(reproduce)

@@ -1,0 +1,247 @@
+"""The paper's claims held against a study: our number, its interval, n, a verdict."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from evolution.judging.held_out import WHEELED_ROBOT
+from evolution.pages.words import PAPERS, label, median_and_quartiles
+from evolution.report.pairs import PairRow, numbers, pairs_of
+from evolution.report.samples import FOLLOWING, following_share
+from evolution.report.tables import held_out_measure, measures
+from evolution.reproduce.verdicts import (
+    HANGS_ON_READING,
+    NOT_MEASURED,
+    OTHER_STUDY,
+    TOO_FEW,
+    of_best,
+    of_most,
+    of_order,
+)
+from evolution.settings.config import flat
+from evolution.study.config import StudyConfig, find_study
+from evolution.study.data import StudyData
+
+PAPER = "paper"
+"""The shipped study whose experiments are the paper's."""
+
+PAPER_BEST = {"de-best": 246.66, "de-rand": 215.217, "ga": 202.775}
+"""Maximum fitness of each algorithm. Source: the paper, section 5."""
+
+REPLICATES = 3
+"""Runs of which that is the best: "at least three"; of more it would be rarer low."""
+
+NEAR = 2 / 3
+"""Share of the best from which on a mean has approached it: our reading."""
+
+MATURE = 0.9
+"""Share of its final best at which a run has mature individuals: our reading."""
+
+EARLY = (0.5, 1 / 3)
+"""Shares of the budget that are early: our readings, a lenient and a strict one."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim and what became of it.
+
+    Attributes:
+        text: what the paper says.
+        ours: what we found, with interval.
+        n: runs that it is based on.
+        verdict: consistent, inconsistent or can't be tested, and why not.
+    """
+
+    text: str
+    ours: str
+    n: str
+    verdict: str
+
+
+def claims(study: StudyData) -> list[Claim]:
+    """All claims of the paper, held against a study."""
+    stored = _samples(study, study.best_stored)
+    shares = _samples(study, lambda name: 100 * mean_to_best(study, name))
+    where = "in the mean's share of the best [%]"
+    in_shares = _orders(_pairs(study, shares), shares, where)
+    early = _samples(study, lambda name: 100 * maturity(study, name))
+    found = [
+        *_orders(_pairs(study, stored), stored, "in best (stored) fitness"),
+        *(_maximum(stored, name) for name in PAPER_BEST),
+        *(_approaches(shares, name) for name in ("de-best", "de-rand")),
+        _stays_apart(shares),
+        *in_shares[1:],
+        *(_mature_early(early, name) for name in ("de-best", "de-rand")),
+        *(_follows(study, name) for name in PAPERS),
+    ]
+    return _of_the_paper(study, found)
+
+
+def held_out_order(study: StudyData, robot: str) -> list[Claim]:
+    """The paper's order in what the paper did not measure, as the report decides it.
+
+    There p values are adjusted for all pairs of the study, baselines included.
+    """
+    held_out = _samples(study, lambda name: study.held_out(name, robot))
+    measure = held_out_measure(robot)
+    rows = pairs_of(measure, measures(study)[measure], study.alike)
+    found = _orders(rows, held_out, f"in held-out fitness on {robot}")
+    return _of_the_paper(study, found)
+
+
+def unlike(study: StudyData) -> list[str]:
+    """What makes experiments others than the paper's, a line each; robots are free."""
+    shipped = StudyConfig.load(find_study(PAPER)).experiments
+    lines = []
+    for name in PAPERS:
+        if name not in study.configs:
+            continue
+        theirs, ours = flat(shipped[name]), flat(study.configs[name])
+        differing = [
+            f"{key} {ours.get(key)} (shipped {theirs.get(key)})"
+            for key in dict.fromkeys([*theirs, *ours])
+            if key not in ("seed", "robot") and theirs.get(key) != ours.get(key)
+        ]
+        if differing:
+            lines.append(f"{name}: {', '.join(differing)}")
+    return lines
+
+
+def mean_to_best(study: StudyData, name: str) -> np.ndarray:
+    """Final population mean as a share of the population's best, `(runs,)`."""
+    histories = [run.history for run in study.runs[name]]
+    return np.array([h["mean"][-1] / max(h["best"][-1], 1e-12) for h in histories])
+
+
+def maturity(study: StudyData, name: str) -> np.ndarray:
+    """Share of what it spent after which a run has 90 % of its best, `(runs,)`."""
+    shares = []
+    for run in study.runs[name]:
+        best = np.maximum.accumulate(run.history["best"])
+        first = (best >= MATURE * best[-1]).argmax()
+        spent = run.history["evaluations"]
+        shares.append(spent[first] / spent[-1])
+    return np.array(shares)
+
+
+def tally(found: Sequence[Claim]) -> dict[str, int]:
+    """How many claims came out which way, the most frequent way first."""
+    return dict(Counter(claim.verdict for claim in found).most_common())
+
+
+def _samples(
+    study: StudyData, value: Callable[[str], np.ndarray]
+) -> dict[str, np.ndarray]:
+    """A sample per algorithm of the paper; empty where the study has none."""
+    return {
+        name: value(name) if study.runs.get(name) else np.zeros(0) for name in PAPERS
+    }
+
+
+def _of_the_paper(study: StudyData, found: Sequence[Claim]) -> list[Claim]:
+    """The claims, none of them tested by other experiments than the paper's."""
+    if not unlike(study):
+        return list(found)
+    return [Claim(each.text, "-", each.n, OTHER_STUDY) for each in found]
+
+
+def _pairs(study: StudyData, samples: dict[str, np.ndarray]) -> list[PairRow]:
+    """All pairs of the paper's algorithms that have runs."""
+    filled = {name: sample for name, sample in samples.items() if sample.size}
+    return pairs_of("", filled, study.alike)
+
+
+def _orders(
+    rows: Sequence[PairRow], samples: dict[str, np.ndarray], where: str
+) -> list[Claim]:
+    """DE/best before DE/rand, DE/best before the GA, DE/rand before the GA."""
+    by_pair, found = {(row.a, row.b): row for row in rows}, []
+    for pair in (("de-best", "de-rand"), ("de-best", "ga"), ("de-rand", "ga")):
+        better, worse = pair
+        text = f"{label(better)} exceeds {label(worse)} {where}"
+        n = f"{samples[better].size} and {samples[worse].size}"
+        row = by_pair.get(pair)
+        if row is None:
+            found.append(Claim(text, "-", n, TOO_FEW))
+        else:
+            found.append(Claim(text, numbers(row), n, of_order(row)))
+    return found
+
+
+def _maximum(stored: dict[str, np.ndarray], name: str) -> Claim:
+    """Whether the paper's maximum has a place among those of our runs."""
+    sample, paper = stored[name], PAPER_BEST[name]
+    text = f"{label(name)} reaches a maximum fitness of {paper}"
+    return _claim(text, sample, lambda: of_best(sample, paper, REPLICATES))
+
+
+def _approaches(shares: dict[str, np.ndarray], name: str) -> Claim:
+    text = f"{label(name)}'s mean approaches its best (read as: above two thirds)"
+    sample = shares[name]
+    return _claim(text, sample, lambda: of_most(sample > 100 * NEAR), "final share")
+
+
+def _stays_apart(shares: dict[str, np.ndarray]) -> Claim:
+    text = "GA's mean stays far from its best (read as: below two thirds)"
+    sample = shares["ga"]
+    return _claim(text, sample, lambda: of_most(sample < 100 * NEAR), "final share")
+
+
+def _mature_early(early: dict[str, np.ndarray], name: str) -> Claim:
+    lenient, strict = EARLY
+    text = (
+        f"{label(name)} has mature individuals early (read as: {MATURE:.0%} of its "
+        f"final best within {lenient:.0%}, and within {strict:.0%}, of the budget)"
+    )
+    sample = early[name]
+
+    def judged() -> tuple[str, str]:
+        ours, verdict = of_most(sample <= 100 * lenient)
+        ours_strictly, strictly = of_most(sample <= 100 * strict)
+        found = f"{ours}, and in {ours_strictly}"
+        return found, verdict if verdict == strictly else HANGS_ON_READING
+
+    return _claim(text, sample, judged, "share spent")
+
+
+def _follows(study: StudyData, name: str) -> Claim:
+    """Finds a wall, follows it, does not crash: on wheels."""
+    text = (
+        f"{label(name)}'s champion finds a wall and follows it without crashing "
+        f"(read as: {FOLLOWING:.0%} of its trials on {WHEELED_ROBOT} are a wall "
+        "follower's or a hugger's)"
+    )
+    tests = [run.champion.scores["held_out"] for run in study.runs.get(name, ())]
+    tests = [test[WHEELED_ROBOT] for test in tests]
+    sample = np.array(
+        [100 * following_share(test) for test in tests if test.get("behaviour")]
+    )
+    return _claim(
+        text, sample, lambda: of_most(sample >= 100 * FOLLOWING), "share of trials"
+    )
+
+
+def _claim(
+    text: str,
+    sample: np.ndarray,
+    judged: Callable[[], tuple[str, str]],
+    quantity: str = "",
+) -> Claim:
+    """A claim about one algorithm.
+
+    Args:
+        text: what the paper says.
+        sample: of the runs that say, `(n,)`, in percent if it has a quantity.
+        judged: what we found and the verdict, if there are runs.
+        quantity: what the sample is.
+    """
+    if not sample.size:
+        return Claim(text, "-", "0", NOT_MEASURED)
+    ours, verdict = judged()
+    if quantity:
+        ours = f"{quantity}: {median_and_quartiles(sample, ' %')}; so in {ours}"
+    else:
+        ours = f"{median_and_quartiles(sample)}; {ours}"
+    return Claim(text, ours, str(sample.size), verdict)

@@ -1,0 +1,50 @@
+"""Why equation (2) is not taken as printed: what it gives controllers not yet evolved.
+
+As printed, turning costs nothing away from walls, so a robot that drives circles in the
+open is near the maximum before evolution has begun.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from evolution.judging.held_out import Judge
+from evolution.run.generation_loop import Experiment
+from evolution.settings.config import ExperimentConfig
+
+N_STARTS = 100
+
+
+@dataclass(frozen=True)
+class FirstGeneration:
+    """The best of a population as it was drawn, by one fitness function.
+
+    Attributes:
+        fitness: name of the step fitness.
+        individuals: how many were drawn.
+        best: stored fitness of the best of them.
+        held_out: its mean on fresh starts.
+        behaviour: share of those trials by behaviour class.
+    """
+
+    fitness: str
+    individuals: int
+    best: float
+    held_out: float
+    behaviour: Mapping[str, float]
+
+
+def first_generation(config: ExperimentConfig, fitness: str) -> FirstGeneration:
+    """What a fitness function thinks of the first generation of an experiment.
+
+    Raises:
+        UserError: if robot or arena cannot be used.
+    """
+    config = config.model_copy(update={"fitness": fitness})
+    experiment = Experiment(config)
+    record = next(experiment.run())
+    judge = Judge(experiment.scene, config.task, config.start_clearance)
+    best = config.network.decode(experiment.best_genomes[0])
+    test = judge.test(best, N_STARTS)
+    return FirstGeneration(
+        fitness, record.evaluations, record.best, test.mean, test.behaviour
+    )

@@ -1,0 +1,89 @@
+"""Verdicts on claims: what runs have to show before they speak for or against one.
+
+As in the report, fewer than 10 runs of an algorithm give none. An order needs
+a Mann-Whitney p below 0.05, adjusted for the pairs of its kind; a statement about
+every run a Wilson interval on one side of one half; the best of a few runs of somebody
+else has to have a rank among ours that is not too extreme.
+"""
+
+from math import comb, floor
+
+import numpy as np
+
+from evolution.pages.words import probability
+from evolution.report.pairs import PairRow
+from evolution.statistics.comparisons import FEWEST_FOR_STARS, LEVELS
+from evolution.statistics.samples import wilson
+
+CONSISTENT, INCONSISTENT = "consistent", "inconsistent"
+NOT_CONTRADICTED = "consistent, in that nothing contradicts it"
+UNDECIDED = "can't be tested: undecided by these runs"
+HANGS_ON_READING = "can't be tested: hangs on the reading"
+TOO_FEW = f"can't be tested: fewer than {FEWEST_FOR_STARS} runs"
+NOT_MEASURED = "can't be tested: not measured"
+OTHER_STUDY = "can't be tested: another study"
+
+
+def of_order(row: PairRow) -> str:
+    """Whether the first experiment of a pair exceeds the second."""
+    if not row.enough:
+        return TOO_FEW
+    if not row.decided:
+        return UNDECIDED
+    return CONSISTENT if row.a12 > 0.5 else INCONSISTENT
+
+
+def of_most(holds: np.ndarray) -> tuple[str, str]:
+    """In how many runs `(n,)` something holds, and whether that is most there are."""
+    share = wilson(int(holds.sum()), holds.size)
+    ours = f"{holds.sum()} of {holds.size} runs [{share.low:.0%}, {share.high:.0%}]"
+    if holds.size < FEWEST_FOR_STARS:
+        return ours, TOO_FEW
+    if share.low > 0.5:
+        return ours, CONSISTENT
+    return ours, INCONSISTENT if share.high < 0.5 else UNDECIDED
+
+
+def of_best(sample: np.ndarray, best: float, replicates: int) -> tuple[str, str]:
+    """Whether the best of so many runs of somebody else may be one of such as ours.
+
+    That it may is all that runs can say. Above all of ours it may be luck for long: of
+    three more runs the best is so with a probability of 3 / (n + 3).
+
+    Args:
+        sample: of our runs, `(n,)`.
+        best: of theirs.
+        replicates: how many they had.
+    """
+    above, p = int((sample > best).sum()), chance_of_best(sample, best, replicates)
+    ours = (
+        f"runs from {sample.min():.1f} to {sample.max():.1f}, {above} of {sample.size} "
+        f"above; the best of {replicates} runs like these has so extreme a rank with "
+        f"p {probability(p)}"
+    )
+    if sample.size < FEWEST_FOR_STARS:
+        return ours, TOO_FEW
+    if p < LEVELS[0]:
+        return ours, INCONSISTENT
+    return ours, NOT_CONTRADICTED if above else UNDECIDED
+
+
+def chance_of_best(sample: np.ndarray, best: float, replicates: int) -> float:
+    """Probability, two-sided, that the best of more runs is as extreme among ours.
+
+    If all runs are alike, theirs and ours are in any order with the same probability.
+    """
+    above, n = int((sample > best).sum()), sample.size
+
+    def at_least(k: int) -> float:
+        """That `k` or more of ours exceed all of theirs: that they lead the order."""
+        return comb(n + replicates - k, replicates) / comb(n + replicates, replicates)
+
+    at_most = 1 - at_least(above + 1) if above < n else 1.0
+    return min(1.0, 2 * min(at_least(above), at_most))
+
+
+def fewest_to_contradict(replicates: int) -> int:
+    """Runs of ours below which no maximum, however high, is too extreme."""
+    # 2 replicates / (n + replicates) below the level
+    return floor(2 * replicates / LEVELS[0] - replicates) + 1

@@ -1,0 +1,1 @@
+"""One run of evolution and its directory: `python -m evolution.run`."""

@@ -1,0 +1,174 @@
+"""Evolve a controller: `python -m evolution.run [EXPERIMENT] [options]`."""
+
+import argparse
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+from epuck_mj.errors import UserError
+from epuck_mj.host.command_line import check_threads, command, main, parse
+from epuck_mj.host.interruption import Interrupted, Interruption
+from epuck_mj.policies.file import ControllerFile
+from evolution.run.directory import RunDirectory
+from evolution.run.execution import Means, Run
+from evolution.run.live import Live, require_viewer
+from evolution.run.progress import Progress
+from evolution.run.results import summary
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.config_files import DEFAULT_EXPERIMENT, find_config, load_config
+
+MODULE = "evolution.run"
+
+
+@dataclass(frozen=True)
+class Options:
+    """Evolve a controller for the e-puck and test its champion on fresh starts.
+
+    Attributes:
+        experiment: a shipped experiment (de-best, de-rand, ga, random-search,
+            one-plus-one-es, cma-es, de-best-calibrated, de-best-randomised,
+            ga-randomised) or a YAML file; it comes first.
+        config: the experiment's keys; a flag wins over the YAML.
+        output: run directory, runs/<experiment>-seed-<seed> if not given.
+        resume: run directory to go on with.
+        threads: threads that step the robots; 0 is one per core. Changes no result.
+        engine: batch steps all robots at once, dm_control one trial after the other.
+            Changes no result.
+        racing: break off individuals that can only lose, where the optimiser allows it
+            (--no-racing lets them live). Changes no result.
+        live: show curves and the best individual in the rerun viewer that is running.
+            Changes no result.
+        print_config: print the resolved YAML and run nothing.
+    """
+
+    experiment: tyro.conf.Positional[str]
+    config: ExperimentConfig
+    output: Path | None = None
+    resume: Path | None = None
+    threads: int = 0
+    engine: Literal["batch", "dm_control"] = "batch"
+    racing: bool = True
+    live: bool = False
+    print_config: bool = False
+
+
+def run(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status.
+
+    Raises:
+        UserError: for anything the user can put right.
+    """
+    options = _options(argv)
+    if options.print_config:
+        print(options.config.to_yaml(), end="")
+        return 0
+    check_threads(options.threads)
+    if options.live:
+        require_viewer()
+    if options.resume is not None:
+        directory = RunDirectory(options.resume)
+        directory.refuse_other_config(options.config)
+        if directory.finished:
+            print(f"{directory.path} is finished; {_replay(directory)}")
+            return 0
+    else:
+        stem = Path(options.experiment).stem
+        default = Path("runs") / f"{stem}-seed-{options.config.seed}"
+        directory = RunDirectory(options.output or default)
+        directory.refuse_if_used()
+    means = Means(options.engine, options.threads, options.racing)
+    evolution = Run(options.config, directory, means, argv)
+    with directory.locked():
+        if options.resume is not None:
+            differing = evolution.resume()
+            if differing:
+                print(
+                    f"warning: {', '.join(differing)} differ from where this run began "
+                    f"(see {directory.provenance}): its last bits may, too",
+                    file=sys.stderr,
+                )
+        else:
+            evolution.start()
+        return _carry_out(evolution, options.live)
+
+
+def _options(argv: Sequence[str]) -> Options:
+    """The options, on top of the experiment or of the run to be resumed."""
+    first = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    first.add_argument("--resume", type=Path, nargs="?")
+    resume = first.parse_known_args(argv)[0].resume
+    named = bool(argv) and not argv[0].startswith("-")
+    experiment = argv[0] if named else DEFAULT_EXPERIMENT
+    if resume is not None and not named:
+        config = RunDirectory(resume).stored_config()
+    else:
+        config = load_config(find_config(experiment))
+    default = Options(experiment, config)
+    options = parse(Options, f"python -m {MODULE}", argv, default)
+    if options.experiment != experiment:
+        raise UserError(
+            f"the experiment comes first: {command(MODULE, options.experiment, '...')}"
+        )
+    # a run can be resumed from anywhere
+    options = replace(options, config=options.config.located())
+    if options.resume is not None and options.output is not None:
+        raise UserError("expected --resume or --output, got both")
+    return options
+
+
+def _carry_out(evolution: Run, live: bool) -> int:
+    """Evolve, then choose and show the champion; the exit status."""
+    experiment, directory = evolution.experiment, evolution.directory
+    started = time.monotonic()
+    with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:
+        try:
+            with interruption.raising():
+                controller = _finished(evolution, live)
+        except Interrupted:
+            print(
+                f"Interrupted after {directory.evaluations():,} evaluations; go on "
+                f"with: {command(MODULE, '--resume', directory.path)}",
+                file=sys.stderr,
+            )
+            return interruption.status
+    minutes, seconds = divmod(round(time.monotonic() - started), 60)
+    print(
+        f"{experiment.optimizer.name}, seed {experiment.config.seed}: "
+        f"{experiment.evaluations:,} evaluations in {len(experiment.records)} "
+        f"generations, {minutes} min {seconds} s"
+    )
+    print(summary(controller))
+    print(f"Written to {directory.path}: {directory.contents()}")
+    print(_replay(directory))
+    return 0
+
+
+def _finished(evolution: Run, live: bool) -> ControllerFile:
+    """Evolve, and choose the champion."""
+    experiment = evolution.experiment
+    budget = experiment.config.evaluations
+    with (
+        Live(experiment) if live else nullcontext() as view,
+        Progress(budget, experiment.evaluations) as progress,
+    ):
+        for record in evolution.evolve():
+            progress.update(record)
+            if view is not None:
+                view.update()
+    print("Choosing the champion on fresh starts ...", file=sys.stderr)
+    return evolution.finish()
+
+
+def _replay(directory: RunDirectory) -> str:
+    return f"Replay: {command('evolution.replay', directory.path)}"
+
+
+if __name__ == "__main__":
+    main(run)

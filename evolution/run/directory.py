@@ -1,0 +1,260 @@
+"""The run directory: what a run leaves behind, and what it can be resumed from."""
+
+import csv
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+from filelock import FileLock, Timeout
+
+from epuck_mj.errors import UserError
+from epuck_mj.host import files
+from epuck_mj.host.yaml_and_json import read_json
+from evolution.run.generation_loop import Experiment
+from evolution.run.provenance import now, to_json
+from evolution.settings.config import ExperimentConfig, differing_keys
+from evolution.settings.config_files import load_config
+
+LOCK = ".lock"
+"""File that the process which works in a directory holds."""
+
+
+@contextmanager
+def locked(directory: Path, patience: float = 0.0) -> Iterator[None]:
+    """Keep every other process out of a directory for the time of the block.
+
+    Args:
+        directory: made if it is not there.
+        patience: how long to wait for one that is there [s].
+
+    Raises:
+        UserError: if one is there all that time, or the directory cannot be made.
+    """
+    with files.writing():
+        directory.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(directory / LOCK, timeout=patience)
+    try:
+        lock.acquire()
+    except Timeout:
+        raise UserError(
+            f"another process is working in '{directory}': wait for it, or stop it"
+        ) from None
+    except OSError as error:
+        raise UserError(f"cannot write output '{directory}': {error.strerror}") from (
+            None
+        )
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+class RunDirectory:
+    """One run's files; the checkpoint decides, everything else follows from it."""
+
+    def __init__(self, path: Path):
+        """Name the directory; nothing is touched yet."""
+        self.path = path
+        self.config = path / "config.yaml"
+        self.provenance = path / "provenance.json"
+        self.checkpoint = path / "checkpoint.npz"
+        self.history = path / "history.csv"
+        self.best_individuals = path / "best_individuals.npz"
+        self.timing = path / "timing.csv"
+        self.champion = path / "champion.json"
+        self.fitness_figure = path / "fitness.png"
+        self.trajectory = path / "trajectory.npz"
+        self.trajectory_figure = path / "trajectory.png"
+        self.recording = path / "champion.rrd"
+
+    def locked(self, patience: float = 0.0) -> AbstractContextManager[None]:
+        """See `locked`."""
+        return locked(self.path, patience)
+
+    def refuse_if_used(self) -> None:
+        """Refuse a directory that holds anything.
+
+        Raises:
+            UserError: if it does, or is not a directory.
+        """
+        try:
+            used = self.path.is_dir() and bool(self._names())
+        except OSError as error:
+            raise UserError(
+                f"cannot write output '{self.path}': {error.strerror}"
+            ) from None
+        if files.is_file(self.path):
+            raise UserError(f"output '{self.path}' is not a directory")
+        if used:
+            raise UserError(
+                f"output '{self.path}' is not empty: expected a new directory, or "
+                f"--resume {self.path} to go on with what is there"
+            )
+
+    def create(self, config: ExperimentConfig, provenance: dict) -> None:
+        """Make the directory and write down what is about to happen.
+
+        Raises:
+            UserError: if it cannot be written.
+        """
+        self.refuse_if_used()
+        with files.writing():
+            self.path.mkdir(parents=True, exist_ok=True)
+            files.remove_leftovers(self.path)
+            files.write_text(self.config, config.to_yaml())
+            files.write_text(self.provenance, to_json(provenance))
+
+    def stored_config(self) -> ExperimentConfig:
+        """The config of the run that is there.
+
+        Raises:
+            UserError: if there is none.
+        """
+        if not files.is_file(self.config):
+            raise UserError(f"no run in '{self.path}': no '{self.config}'")
+        return load_config(self.config)
+
+    def refuse_other_config(self, config: ExperimentConfig) -> None:
+        """Refuse to go on with a changed config.
+
+        Raises:
+            UserError: naming the keys that differ.
+        """
+        differing = differing_keys(self.stored_config(), config)
+        if differing:
+            raise UserError(
+                f"cannot resume '{self.path}' with another config; these keys differ: "
+                + ", ".join(differing)
+            )
+
+    def restore(self, experiment: Experiment, provenance: dict) -> list[str]:
+        """Put the experiment where the checkpoint is; at its start if there is none.
+
+        Returns:
+            What differs from where the run began and may change its last bits.
+
+        Raises:
+            UserError: if the checkpoint cannot be read or belongs to something else,
+                or the models have been edited since.
+        """
+        first = self.provenance_fields() or provenance
+        self._refuse_other_models(first, provenance)
+        if self.checkpoint.exists():
+            state = files.read_arrays(self.checkpoint)
+            try:
+                config = str(state.pop("config", ""))
+                where = f"its config in '{self.checkpoint}'"
+                if ExperimentConfig.from_yaml(config, where) != experiment.config:
+                    raise ValueError("it was made with another config")
+                experiment.restore(state)
+            except ValueError as error:
+                raise UserError(
+                    f"'{self.checkpoint}' is not a checkpoint of this run: {error}"
+                ) from None
+        with files.writing():
+            files.remove_leftovers(self.path)
+            # the run may have been killed between its files
+            self._write_derived(experiment, ())
+            resumed = [*first.get("resumed", ()), provenance]
+            files.write_text(self.provenance, to_json({**first, "resumed": resumed}))
+        keys = ("versions", "git", "processor")
+        return [key for key in keys if first.get(key) != provenance[key]]
+
+    def _refuse_other_models(self, first: dict, now: dict) -> None:
+        before, after = first.get("mjcf_sha256"), now["mjcf_sha256"]
+        if before != after:
+            raise UserError(
+                f"cannot resume '{self.path}': its robot or arena has been edited "
+                f"since (SHA-256 {before}, now {after})"
+            )
+
+    def save(self, experiment: Experiment, seconds: Sequence[float]) -> None:
+        """Checkpoint, then what can be derived from it.
+
+        Args:
+            experiment: to save.
+            seconds: that each generation since the last save took.
+
+        Raises:
+            UserError: if the directory can no longer be written; what was there
+                before is intact.
+        """
+        config = np.array(experiment.config.to_yaml())
+        try:
+            state = {"config": config, **experiment.state()}
+            files.write_arrays(self.checkpoint, state)
+            self._write_derived(experiment, seconds)
+        except OSError as error:
+            raise UserError(
+                f"cannot write '{self.path}': {error.strerror}; what was there before "
+                f"is intact: --resume {self.path}"
+            ) from None
+
+    def _write_derived(self, experiment: Experiment, seconds: Sequence[float]) -> None:
+        """What the checkpoint holds as well, for those who only read."""
+        files.write_text(self.history, experiment.history())
+        if experiment.records:
+            best = {
+                "genomes": np.array(experiment.best_genomes),
+                "fitness": np.array([record.best for record in experiment.records]),
+            }
+            files.write_arrays(self.best_individuals, best)
+            files.write_text(self.timing, self._timing(experiment, seconds))
+
+    def _timing(self, experiment: Experiment, seconds: Sequence[float]) -> str:
+        """Text of timing.csv; no seconds where a kill took them."""
+        taken: dict[int, str] = {}
+        if files.is_file(self.timing):
+            text = self.timing.read_text(encoding="utf-8", errors="replace")
+            for row in csv.DictReader(text.splitlines()):
+                # a row that was cut off says nothing
+                with suppress(KeyError, TypeError, ValueError):
+                    taken[int(row["generation"])] = f"{float(row['seconds']):.3f}"
+        first = len(experiment.records) - len(seconds)
+        taken |= {first + i: f"{each:.3f}" for i, each in enumerate(seconds)}
+        lines = [
+            f"{record.generation},{taken.get(record.generation, '')},"
+            f"{record.control_steps},{record.crash_rate:.4f}\n"
+            for record in experiment.records
+        ]
+        return "".join(["generation,seconds,control_steps,crash_rate\n", *lines])
+
+    def evaluations(self) -> int:
+        """Individuals evaluated up to the checkpoint."""
+        if not self.checkpoint.exists():
+            return 0
+        return int(files.read_arrays(self.checkpoint)["records"][-1, 1])
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run has written everything."""
+        return bool(self.provenance_fields().get("finished"))
+
+    def mark_finished(self) -> None:
+        """Write down when everything was there."""
+        fields = self.provenance_fields() | {"finished": now()}
+        with files.writing():
+            files.write_text(self.provenance, to_json(fields))
+
+    def contents(self) -> str:
+        """Names of the files, for a person."""
+        return ", ".join(self._names())
+
+    def _names(self) -> list[str]:
+        """What is there, but for what a killed writer left behind."""
+        aside = {*files.leftovers(self.path), self.path / LOCK}
+        return sorted(p.name for p in self.path.iterdir() if p not in aside)
+
+    def provenance_fields(self) -> dict:
+        """What is known of the run's beginning; empty if it was killed before.
+
+        Raises:
+            UserError: if it is damaged.
+        """
+        if not files.is_file(self.provenance):
+            return {}
+        fields = read_json(self.provenance)
+        if not isinstance(fields.get("resumed", []), list):
+            raise UserError(f"'{self.provenance}' is damaged: 'resumed' is not a list")
+        return fields

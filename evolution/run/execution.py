@@ -1,0 +1,114 @@
+"""Carrying a run out: evolve, save on the way, choose and test the champion.
+
+What a person's single run and a run of a study have in common. However it is carried
+out, and however often it is interrupted, the same config leaves the same bytes.
+"""
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from epuck_mj.host.files import writing
+from epuck_mj.policies.file import ControllerFile
+from evolution.judging.evaluation import Engine
+from evolution.run.directory import RunDirectory
+from evolution.run.generation_loop import Experiment, Record
+from evolution.run.provenance import provenance
+from evolution.run.results import judges, write_results
+from evolution.settings.config import ExperimentConfig
+
+SAVING_SHARE = 0.05
+"""Most of the time that goes into checkpoints, where generations are short."""
+
+
+@dataclass(frozen=True)
+class Means:
+    """How a run is carried out, which changes none of its results.
+
+    Attributes:
+        engine: one of `generation_loop.ENGINES`, or an engine whose `str` is what
+            the provenance calls it.
+        threads: that step the robots; 0 is one per core.
+        racing: break off individuals that can only lose.
+    """
+
+    engine: str | Engine = "batch"
+    threads: int = 0
+    racing: bool = True
+
+
+class Run:
+    """A run and its directory."""
+
+    def __init__(
+        self,
+        config: ExperimentConfig,
+        directory: RunDirectory,
+        means: Means,
+        argv: Sequence[str],
+    ):
+        """Load everything the run needs to its very end; nothing is written yet.
+
+        Args:
+            config: what to do.
+            directory: where to write.
+            means: how to do it.
+            argv: what was asked for, for the provenance.
+
+        Raises:
+            UserError: if robot or arena cannot be used, or the budget is too small.
+        """
+        self.experiment = Experiment(config, means.engine, means.threads, means.racing)
+        self.directory = directory
+        # found out now, not after the evolution
+        self._judges = judges(config, means.threads)
+        self._provenance = provenance(
+            self.experiment.scene, argv, str(means.engine), means.threads
+        )
+        self._threads = means.threads
+
+    def start(self) -> None:
+        """Begin in a new directory.
+
+        Raises:
+            UserError: if it holds anything, or cannot be written.
+        """
+        self.directory.create(self.experiment.config, self._provenance)
+
+    def resume(self) -> list[str]:
+        """Go on with what the directory holds.
+
+        Returns:
+            What differs from where the run began and may change its last bits.
+
+        Raises:
+            UserError: as `RunDirectory.restore`.
+        """
+        return self.directory.restore(self.experiment, self._provenance)
+
+    def evolve(self) -> Iterator[Record]:
+        """Go through the generations that are left, saving on the way."""
+        before, cost = time.monotonic(), 0.0
+        seconds: list[float] = []
+        for record in self.experiment.run():
+            after = time.monotonic()
+            seconds.append(after - before)
+            before = after
+            if sum(seconds) * SAVING_SHARE > cost or self.experiment.finished:
+                self.directory.save(self.experiment, seconds)
+                before = time.monotonic()
+                cost, seconds = before - after, []
+            yield record
+
+    def finish(self) -> ControllerFile:
+        """Choose the champion, test it, and write all that shows it.
+
+        Raises:
+            UserError: if it cannot be written.
+        """
+        with writing():
+            controller = write_results(
+                self.experiment, self._judges, self.directory, self._threads
+            )
+        self.directory.mark_finished()
+        return controller

@@ -1,0 +1,84 @@
+"""Where a run came from: versions, code, models, machine, command and time."""
+
+import json
+import platform
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from epuck_mj.scene.model import Scene
+
+PACKAGES = ("mujoco", "dm-control", "numpy", "scipy", "pydantic", "rerun-sdk")
+
+
+def provenance(
+    scene: Scene, argv: Sequence[str], engine: str, threads: int
+) -> dict[str, Any]:
+    """Everything that could explain a difference, as JSON values.
+
+    MuJoCo's results are bit-identical for one version on one type of processor only,
+    hence the processor's flags.
+    """
+    return {
+        "argv": list(argv),
+        "engine": engine,
+        "threads": threads,
+        "versions": {
+            "python": platform.python_version(),
+            **{package: version(package) for package in PACKAGES},
+        },
+        "git": _git(),
+        "mjcf_sha256": dict(scene.sha256),
+        "platform": " ".join([platform.system(), *platform.libc_ver()]),
+        "processor": processor(),
+        "started": now(),
+        "finished": None,
+    }
+
+
+def now() -> str:
+    """The time in UTC, ISO 8601."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def to_json(fields: Mapping[str, Any]) -> str:
+    """The file's text."""
+    return json.dumps(fields, indent=1) + "\n"
+
+
+def _git() -> dict[str, Any] | None:
+    """Commit and whether the work tree differs from it; None outside a checkout."""
+    folder = Path(__file__).resolve().parent
+    try:
+        commit, status = (
+            subprocess.run(
+                ["git", *arguments],
+                cwd=folder,
+                capture_output=True,
+                text=True,
+                check=True,
+                timeout=10,
+            ).stdout.strip()
+            for arguments in (("rev-parse", "HEAD"), ("status", "--porcelain"))
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return {"commit": commit, "modified": bool(status)}
+
+
+def processor() -> dict[str, Any]:
+    """Model name and flags, as far as the system tells."""
+    fields: dict[str, Any] = {"machine": platform.machine(), "model": None, "flags": []}
+    if sys.platform == "linux":
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            key, _, value = line.partition(":")
+            if key.strip() == "model name":
+                fields["model"] = value.strip()
+            elif key.strip() in ("flags", "Features"):
+                fields["flags"] = value.split()
+                break
+    return fields

@@ -1,0 +1,1 @@
+"""Optimisers: ask for genomes, tell their fitness; one file an algorithm."""

@@ -1,0 +1,222 @@
+"""CMA-ES with restarts, maximising: the package `cmaes` behind ask and tell.
+
+Each start is a `cmaes.CMA` at a random mean in the initial range. When it has nothing
+left to find, or only noise, the next generation starts another one with twice the
+population. `cmaes` sees the former; the latter is `has_stagnated`. A genome
+outside the bounds is drawn again up to 100 times, then clipped, by `cmaes`.
+
+A `cmaes.CMA` cannot be saved without pickle or its private attributes. But it is a
+function of its seed and of what it was told: that is the state, and it is restored by
+asking and telling everything again. Randomness is drawn in this order: for each start
+the mean, then the seed of `cmaes`, which has a bit generator of its own.
+
+Source:
+    N. Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772; restarts:
+    A. Auger and N. Hansen, IEEE Congress on Evolutionary Computation (2005) 1769-1776.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from cmaes import CMA
+from numpy.random import Generator
+
+from evolution.search.ask_tell import (
+    Optimizer,
+    checked_state,
+    generator_state,
+    read_only,
+    restored_generator,
+)
+from evolution.search.search_space import SearchSpace, refuse_wide_steps
+
+# With a single parent, half of 3, `cmaes` divides by a learning rate of 0.
+MIN_POPULATION = 4
+
+
+def made_finite(fitness: np.ndarray) -> np.ndarray:
+    """Fitness `(n,)` in the same order, without infinities.
+
+    The infinite ones come just behind the worst finite one, or just before the best: a
+    `cmaes.CMA` uses the order, and the range only to see that it has become nothing.
+
+    Args:
+        fitness: `(n,)` without NaN.
+    """
+    finite = fitness[np.isfinite(fitness)]
+    worst, best = (finite.min(), finite.max()) if len(finite) else (0.0, 0.0)
+    return np.clip(fitness, np.nextafter(worst, -np.inf), np.nextafter(best, np.inf))
+
+
+@dataclass(frozen=True)
+class CmaEsParameters:
+    """What a CMA-ES is made of.
+
+    Attributes:
+        population: individuals of a generation (lambda), at least 4; doubled by each
+            restart. The tutorial's default for 40 genes is 15.
+        sigma: first step size of each start, above 0, at most the width of the bounds.
+        restarts: start again when there is no more progress; otherwise go on.
+        algorithm: what it is, for configurations.
+
+    Raises:
+        ValueError: a value out of its range.
+    """
+
+    population: int = 15
+    sigma: float = 2.0
+    restarts: bool = True
+    algorithm: Literal["cma_es"] = "cma_es"
+    # read by the configuration: a misspelt key is refused
+    __pydantic_config__: ClassVar = {"extra": "forbid"}
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        if self.population < MIN_POPULATION:
+            raise ValueError(
+                f"population: expected at least {MIN_POPULATION} for two parents, "
+                f"got {self.population}"
+            )
+        if not 0 < self.sigma < np.inf:
+            raise ValueError(f"sigma: expected a number above 0, got {self.sigma}")
+
+
+class CmaEs(Optimizer):
+    """The optimiser 'cma-es'.
+
+    Its population are the individuals last told, good or bad; it grows at a restart.
+    """
+
+    def __init__(
+        self, parameters: CmaEsParameters, space: SearchSpace, rng: Generator
+    ) -> None:
+        """Draw the first genomes; `rng` belongs to the optimiser from here on.
+
+        Raises:
+            ValueError: steps wider than the bounds.
+        """
+        refuse_wide_steps(parameters.sigma, space)
+        self._parameters = parameters
+        self._space = space
+        self._rng = rng
+        # What the whole search follows from, together with what will be told.
+        self._birth = generator_state(rng)
+        self._told = [np.empty(0)]
+        self._cma = self._started(parameters.population)
+        super().__init__("cma-es", self._propose(), rng)
+
+    def next_size(self) -> int:
+        """See `Optimizer.next_size`."""
+        return self._cma.population_size
+
+    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+        """Make the generation asked the current one; start again if it is time."""
+        # it minimises
+        costs = (-made_finite(told)).tolist()
+        self._cma.tell(list(zip(asked, costs, strict=True)))
+        self._told.append(told)
+        self._history.append((told.max(), np.sort(told)[len(told) // 2]))
+        if self._parameters.restarts and self._should_stop():
+            self._cma = self._started(2 * self._cma.population_size)
+        self.population, self.fitness = read_only(asked), read_only(told)
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """See `Optimizer.restore`.
+
+        Takes as long as all asks and tells up to there. What was told must also fill
+        whole generations, and as many as there were.
+        """
+        # As long as it is; all the rest is as in any other state.
+        n_told = np.size(state["told"]) if "told" in state else 0
+        like = {**self._arrays(), "told": np.empty(n_told)}
+        arrays = checked_state(state, like=like)
+        rng = restored_generator(self._rng, arrays["generator"])
+        replayed = CmaEs(self._parameters, self._space, rng)
+        told, generations = arrays["told"], int(arrays["generation"])
+        while len(told) >= replayed.next_size():
+            n = replayed.next_size()
+            replayed.ask()
+            replayed.tell(told[:n])
+            told = told[n:]
+        if len(told) or replayed.generation != generations:
+            raise ValueError(
+                f"state array 'told': expected the fitness of {generations} "
+                f"generations, got {n_told} values, of {replayed.generation} "
+                f"generations and {len(told)} more individuals"
+            )
+        # All of it: another search has begun and come as far as this.
+        vars(self).update(vars(replayed))
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return {
+            "name": np.array(self.name),
+            "generation": np.array(self.generation),
+            "told": np.concatenate(self._told),
+            "generator": self._birth.copy(),
+        }
+
+    def _should_stop(self) -> bool:
+        """Whether the present start has nothing left to find, or only noise."""
+        window = stagnation_window(
+            len(self._history), self._space.genes, self._cma.population_size
+        )
+        # not the whole of it: it is made an array in every generation
+        recent = np.array(self._history[-window:])
+        return self._cma.should_stop() or has_stagnated(recent, window)
+
+    def _started(self, population: int) -> CMA:
+        """A new search of that population at a random mean, without a history."""
+        # fitness of the best and of the median individual of each of its generations
+        self._history: list[tuple[float, float]] = []
+        space = self._space
+        mean = self._rng.uniform(space.init_lower, space.init_upper, size=space.genes)
+        return CMA(
+            mean=mean,
+            sigma=self._parameters.sigma,
+            bounds=np.tile([space.lower, space.upper], (space.genes, 1)),
+            seed=int(self._rng.integers(2**32)),
+            population_size=population,
+        )
+
+    def _propose(self) -> np.ndarray:
+        """The next genomes of the present search `(next_size(), genes)`."""
+        return np.array([self._cma.ask() for _ in range(self.next_size())])
+
+
+def stagnation_window(generations: int, genes: int, population: int) -> int:
+    """How many of its last generations a start is judged by: a fifth, at least 120.
+
+    Args:
+        generations: how many there were since the start.
+        genes: of a genome.
+        population: individuals of a generation.
+    """
+    at_least = 120 + 30 * genes / population
+    return int(np.clip(0.2 * generations, at_least, 20000))
+
+
+def has_stagnated(history: np.ndarray, window: int) -> bool:
+    """Whether fitness has not risen in the last `window` generations.
+
+    Of none of the columns the median of the last 30 % is above that of the first 30 %.
+    While there are fewer generations than that, there is no saying: False. Criteria
+    about the range of fitness or the size of steps do not see it, since noise keeps
+    both wide.
+
+    Args:
+        history: fitness `(generations, columns)` without NaN.
+        window: at least 4.
+
+    Source: the tutorial, appendix B.3, Stagnation.
+    """
+    if len(history) < window:
+        return False
+    part = int(0.3 * window)
+    # the upper median: infinities have no mean
+    first, last = (
+        np.sort(values, axis=0)[part // 2]
+        for values in (history[-window:][:part], history[-part:])
+    )
+    return bool(np.all(last <= first))

@@ -1,0 +1,198 @@
+"""Differential evolution, DE/best/1/bin and DE/rand/1/bin, synchronous and maximising.
+
+The whole new generation is built from the old one (Algorithm 1 of the paper): each
+individual x gets one trial y, crossed with a mutant u, and is replaced iff
+f(y) > f(x). A tie keeps the parent. Randomness is drawn in this order: the initial
+population, then for each generation the parents, the crossover, the bounds rule.
+
+Source:
+    Algorithm 1 and equation (1) of the paper; the names of the strategies are those of
+    Storn and Price, J. Global Optimization 11 (1997) 341-359. What happens to a trial
+    outside the bounds is not said there: see `evolution/search/bounds.py`.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.random import Generator
+
+from evolution.search.ask_tell import Optimizer, read_only
+from evolution.search.bounds import BOUNDS_RULES, check_bounds_rule
+from evolution.search.search_space import SearchSpace
+
+# i and three more, all distinct; both strategies draw the same three.
+MIN_POPULATION = 4
+
+
+def distinct_parents(population: int, rng: Generator) -> np.ndarray:
+    """Indices r1, r2, r3 `(population, 3)`, distinct in a row and not the row's own.
+
+    Every such triple is equally likely.
+    """
+    # Ranking random keys shuffles each row; a row's own index is put last.
+    keys = rng.random((population, population))
+    np.fill_diagonal(keys, np.inf)
+    return np.argsort(keys, axis=1)[:, :3]
+
+
+def rand_1(
+    genomes: np.ndarray, best: int, parents: np.ndarray, scale: float
+) -> np.ndarray:
+    """Mutants of DE/rand/1: u = x_r1 + F (x_r2 - x_r3), equation (1)."""
+    r1, r2, r3 = parents.T
+    return genomes[r1] + scale * (genomes[r2] - genomes[r3])
+
+
+def best_1(
+    genomes: np.ndarray, best: int, parents: np.ndarray, scale: float
+) -> np.ndarray:
+    """Mutants of DE/best/1: equation (1) with the best individual as r1.
+
+    As usual, r2 or r3 may be the best too, and the best is also a base for itself.
+    """
+    _, r2, r3 = parents.T
+    return genomes[best] + scale * (genomes[r2] - genomes[r3])
+
+
+Strategy = Callable[[np.ndarray, int, np.ndarray, float], np.ndarray]
+# (genomes (population, genes), best, parents (population, 3), F) -> mutants
+STRATEGIES: Mapping[str, Strategy] = {"best": best_1, "rand": rand_1}
+
+
+def binomial_crossover(
+    parents: np.ndarray, mutants: np.ndarray, crossover: float, rng: Generator
+) -> np.ndarray:
+    """Trials `(population, genes)`: mutant where rand_j < CR or j = R, else parent.
+
+    Args:
+        parents: `(population, genes)`.
+        mutants: `(population, genes)`.
+        crossover: CR; 0 takes the one gene R from the mutant, 1 takes all.
+        rng: draws R `(population,)`, then rand `(population, genes)`.
+    """
+    population, genes = parents.shape
+    forced = rng.integers(genes, size=population)
+    from_mutant = rng.random((population, genes)) < crossover
+    from_mutant[np.arange(population), forced] = True
+    return np.where(from_mutant, mutants, parents)
+
+
+@dataclass(frozen=True)
+class DifferentialEvolutionParameters:
+    """What a differential evolution is made of.
+
+    Attributes:
+        strategy: best or rand: which individual is the base of a mutant.
+        population: number of individuals N, at least 4.
+        scale: F in [0, 2], the differential weight.
+        crossover: CR in [0, 1], the probability that a gene comes from the mutant.
+        bounds_rule: midpoint, none, clip, reflect or reinit: where a gene outside the
+            bounds goes.
+        reevaluate_parents: ask parents and trials together from the second generation
+            on, and compare and store fresh fitness only. A generation then costs 2 N.
+        algorithm: what it is, for configurations.
+
+    Raises:
+        ValueError: a value out of its range or an unknown name.
+    """
+
+    strategy: str
+    population: int
+    scale: float
+    crossover: float
+    bounds_rule: str = "midpoint"
+    reevaluate_parents: bool = False
+    algorithm: Literal["differential_evolution"] = "differential_evolution"
+    # read by the configuration: a misspelt key is refused
+    __pydantic_config__: ClassVar = {"extra": "forbid"}
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        if self.strategy not in STRATEGIES:
+            raise ValueError(
+                f"unknown strategy {self.strategy!r}; "
+                f"available: {', '.join(STRATEGIES)}"
+            )
+        if self.population < MIN_POPULATION:
+            raise ValueError(
+                f"population: expected at least {MIN_POPULATION} for distinct parents, "
+                f"got {self.population}"
+            )
+        if not 0 <= self.scale <= 2:
+            raise ValueError(f"scale (F): expected 0 to 2, got {self.scale}")
+        if not 0 <= self.crossover <= 1:
+            raise ValueError(f"crossover (CR): expected 0 to 1, got {self.crossover}")
+        check_bounds_rule(self.bounds_rule)
+
+
+class DifferentialEvolution(Optimizer):
+    """The optimiser 'de-best' or 'de-rand', by its strategy.
+
+    Its population are the survivors. Without `reevaluate_parents` their stored fitness
+    is for ever the one that let them in.
+    """
+
+    def __init__(
+        self,
+        parameters: DifferentialEvolutionParameters,
+        space: SearchSpace,
+        rng: Generator,
+    ) -> None:
+        """Draw the initial population; `rng` belongs to the optimiser from here on."""
+        shape = (parameters.population, space.genes)
+        population = rng.uniform(space.init_lower, space.init_upper, size=shape)
+        super().__init__(f"de-{parameters.strategy}", population, rng)
+        self._parameters = parameters
+        self._space = space
+
+    def next_size(self) -> int:
+        """See `Optimizer.next_size`."""
+        return len(self.population) * (2 if self._reevaluates() else 1)
+
+    def to_beat(self) -> np.ndarray:
+        """See `Optimizer.to_beat`: a trial that does not beat its parent is forgotten.
+
+        Without a limit in the initial population and where parents are re-evaluated,
+        which changes what is to be beaten.
+        """
+        asked = self._pending()
+        if self._reevaluates():
+            return np.full(len(asked), -np.inf)
+        return self.fitness.copy()
+
+    def _reevaluates(self) -> bool:
+        """Whether this generation asks parents and trials together."""
+        return self._parameters.reevaluate_parents and self.generation > 0
+
+    def _propose(self) -> np.ndarray:
+        """The trials, after their parents if those are re-evaluated."""
+        trials = self._trials()
+        if self._reevaluates():
+            return np.concatenate([self.population, trials])
+        return trials
+
+    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+        """Let each trial replace its parent if it is strictly better."""
+        n = len(self.population)
+        # survivors carry the fitness they were compared with, -inf at first
+        parent_fitness = told[:n] if self._reevaluates() else self.fitness
+        trials, trial_fitness = asked[-n:], told[-n:]
+        accepted = trial_fitness > parent_fitness
+        self.population = read_only(
+            np.where(accepted[:, np.newaxis], trials, self.population)
+        )
+        self.fitness = read_only(np.where(accepted, trial_fitness, parent_fitness))
+
+    def _trials(self) -> np.ndarray:
+        """One trial for each individual `(population, genes)`."""
+        parameters, space, genomes = self._parameters, self._space, self.population
+        parents = distinct_parents(len(genomes), self._rng)
+        # On ties the first is the best.
+        best = int(np.argmax(self.fitness))
+        mutate = STRATEGIES[parameters.strategy]
+        mutants = mutate(genomes, best, parents, parameters.scale)
+        trials = binomial_crossover(genomes, mutants, parameters.crossover, self._rng)
+        keep_inside = BOUNDS_RULES[parameters.bounds_rule]
+        return keep_inside(trials, genomes, space.lower, space.upper, self._rng)

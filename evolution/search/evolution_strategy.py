@@ -1,0 +1,142 @@
+"""(1+1) evolution strategies with the one-fifth success rule, maximising.
+
+Several run side by side and never meet: each lineage is one parent with its own step
+size sigma. In every generation it gets one offspring, the parent plus sigma times a
+standard normal vector, and is replaced iff that is strictly fitter. A tie keeps the
+parent and counts as a failure. Randomness is drawn in this order: the initial
+population, then for each generation the normal vectors, the bounds rule.
+
+Source:
+    I. Rechenberg, Evolutionsstrategie (1973), for the rule; in the form for a single
+    offspring of S. Kern et al., Natural Computing 3 (2004) 77-112: sigma times alpha
+    after a success, times alpha**(-1/4) after a failure, so that it stays where one
+    offspring in five is a success. alpha = exp(1/3) is what A. Auger and N. Hansen use
+    in their tutorials. An offspring outside the bounds: see `bounds.py`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.random import Generator
+
+from evolution.search.ask_tell import Optimizer, read_only
+from evolution.search.bounds import BOUNDS_RULES, check_bounds_rule
+from evolution.search.search_space import SearchSpace, refuse_wide_steps
+
+ALPHA = np.exp(1 / 3)
+"""What a success multiplies sigma with; four failures undo it."""
+
+SIGMA_MIN = 1e-12
+"""Smallest sigma, as a share of the width of the bounds: the rule alone has none."""
+
+
+def one_fifth_rule(
+    sigma: np.ndarray, success: np.ndarray, lower: float, upper: float
+) -> np.ndarray:
+    """The next sigma `(lineages,)`, between `SIGMA_MIN` and 1 width of the bounds.
+
+    Args:
+        sigma: step sizes `(lineages,)`.
+        success: whether the offspring replaced its parent `(lineages,)`.
+        lower: smallest allowed value of a gene.
+        upper: largest allowed value of a gene.
+    """
+    width = upper - lower
+    adapted = sigma * np.where(success, ALPHA, ALPHA**-0.25)
+    return np.clip(adapted, SIGMA_MIN * width, width)
+
+
+@dataclass(frozen=True)
+class EvolutionStrategyParameters:
+    """What (1+1) evolution strategies are made of.
+
+    Attributes:
+        lineages: number of strategies side by side, at least 1: the population.
+        sigma: first step size of each, above 0, at most the width of the bounds.
+        bounds_rule: midpoint, none, clip, reflect or reinit: where a gene outside the
+            bounds goes.
+        algorithm: what it is, for configurations.
+
+    Raises:
+        ValueError: a value out of its range or an unknown name.
+    """
+
+    lineages: int = 10
+    sigma: float = 1.0
+    bounds_rule: str = "reflect"
+    algorithm: Literal["evolution_strategy"] = "evolution_strategy"
+    # read by the configuration: a misspelt key is refused
+    __pydantic_config__: ClassVar = {"extra": "forbid"}
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        if self.lineages < 1:
+            raise ValueError(f"lineages: expected at least 1, got {self.lineages}")
+        if not 0 < self.sigma < np.inf:
+            raise ValueError(f"sigma: expected a number above 0, got {self.sigma}")
+        check_bounds_rule(self.bounds_rule)
+
+
+class EvolutionStrategy(Optimizer):
+    """The optimiser 'one-plus-one-es'.
+
+    Its population are the parents. Their stored fitness is for ever the one that let
+    them in.
+    """
+
+    def __init__(
+        self,
+        parameters: EvolutionStrategyParameters,
+        space: SearchSpace,
+        rng: Generator,
+    ) -> None:
+        """Draw the first parents; `rng` belongs to the optimiser from here on.
+
+        Raises:
+            ValueError: steps wider than the bounds.
+        """
+        refuse_wide_steps(parameters.sigma, space)
+        shape = (parameters.lineages, space.genes)
+        population = rng.uniform(space.init_lower, space.init_upper, size=shape)
+        super().__init__("one-plus-one-es", population, rng)
+        self._parameters = parameters
+        self._space = space
+        self._sigma = np.full(parameters.lineages, parameters.sigma, dtype=np.float64)
+
+    def to_beat(self) -> np.ndarray:
+        """See `Optimizer.to_beat`: the parents' fitness, which at first is -inf.
+
+        Any other offspring is a failure, and by how much is forgotten.
+        """
+        self._pending()
+        return self.fitness.copy()
+
+    def _propose(self) -> np.ndarray:
+        """One offspring of each parent `(lineages, genes)`."""
+        parents, space, rng = self.population, self._space, self._rng
+        steps = rng.standard_normal(parents.shape)
+        offspring = parents + self._sigma[:, np.newaxis] * steps
+        keep_inside = BOUNDS_RULES[self._parameters.bounds_rule]
+        return keep_inside(offspring, parents, space.lower, space.upper, rng)
+
+    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+        """Let offspring replace their parents if strictly better; adapt sigma."""
+        if self.generation == 0:
+            self.fitness = read_only(told)
+            return
+        success = told > self.fitness
+        self.population = read_only(
+            np.where(success[:, np.newaxis], asked, self.population)
+        )
+        self.fitness = read_only(np.where(success, told, self.fitness))
+        lower, upper = self._space.lower, self._space.upper
+        self._sigma = one_fifth_rule(self._sigma, success, lower, upper)
+
+    def _load(self, arrays: Mapping[str, np.ndarray]) -> None:
+        super()._load(arrays)
+        self._sigma = arrays["sigma"]
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return {**super()._arrays(), "sigma": self._sigma.copy()}

@@ -1,0 +1,212 @@
+"""A generational genetic algorithm on binary chromosomes, maximising.
+
+Each gene is a fixed number of bits, plain binary, most significant first. A new
+generation is bred from the one last told: tournaments choose the parents, pairs of
+them are crossed at one point, bits are flipped. Nothing survives by itself unless
+`elites` is set. Randomness is drawn in this order: the initial bits, then for each
+generation the tournaments, the crossover, the mutation.
+
+Source:
+    Sections 2 and 4 of the paper: population, crossover and mutation rates. Bits per
+    gene, tournament size and the kind of crossover are this project's reading.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.random import Generator
+
+from evolution.search.ask_tell import Optimizer, read_only
+from evolution.search.search_space import SearchSpace
+
+# Levels of more bits are not worth a float64's 53 digits.
+MAX_BITS = 32
+
+
+def decode(
+    chromosomes: np.ndarray, bits: int, lower: float, upper: float
+) -> np.ndarray:
+    """Genomes `(..., genes)`, linear in the bits read as a number.
+
+    Args:
+        chromosomes: `(..., genes * bits)` of bool, the most significant bit first.
+        bits: per gene.
+        lower: what all zeros decode to.
+        upper: what all ones decode to.
+    """
+    by_gene = chromosomes.reshape(*chromosomes.shape[:-1], -1, bits)
+    levels = by_gene @ 2.0 ** np.arange(bits - 1, -1, -1)
+    share = levels / (2**bits - 1)
+    # In this form both ends are exact.
+    return lower * (1 - share) + upper * share
+
+
+def tournament_winners(
+    fitness: np.ndarray, n_winners: int, size: int, rng: Generator
+) -> np.ndarray:
+    """Indices `(n_winners,)` of the best of `size` individuals each.
+
+    Contestants are drawn uniformly with replacement; of equals the first drawn wins.
+
+    Args:
+        fitness: `(population,)`.
+        n_winners: number of independent tournaments.
+        size: contestants in each.
+        rng: draws the contestants `(n_winners, size)`.
+    """
+    contestants = rng.integers(len(fitness), size=(n_winners, size))
+    first = np.argmax(fitness[contestants], axis=1)
+    return contestants[np.arange(n_winners), first]
+
+
+def one_point_crossover(
+    parents: np.ndarray, probability: float, rng: Generator
+) -> np.ndarray:
+    """Children `(2 * pairs, length)`: rows 2k and 2k + 1 with their tails exchanged.
+
+    Args:
+        parents: `(2 * pairs, length)` of bool, length at least 2.
+        probability: that a pair is crossed at all.
+        rng: draws the points `(pairs,)` in 1 to length - 1, then who is crossed
+            `(pairs,)`.
+    """
+    first, second = parents[0::2], parents[1::2]
+    n_pairs, length = first.shape
+    points = rng.integers(1, length, size=n_pairs)
+    crossed = rng.random(n_pairs) < probability
+    tail = np.arange(length) >= points[:, np.newaxis]
+    exchanged = tail & crossed[:, np.newaxis]
+    children = np.empty_like(parents)
+    children[0::2] = np.where(exchanged, second, first)
+    children[1::2] = np.where(exchanged, first, second)
+    return children
+
+
+def mutate(chromosomes: np.ndarray, probability: float, rng: Generator) -> np.ndarray:
+    """Chromosomes `(n, length)` in which each bit is flipped with `probability`."""
+    return chromosomes ^ (rng.random(chromosomes.shape) < probability)
+
+
+@dataclass(frozen=True)
+class GeneticAlgorithmParameters:
+    """What a genetic algorithm is made of.
+
+    Attributes:
+        population: number of individuals, at least 2; may be odd.
+        bits: per gene, 1 to 32.
+        tournament: contestants in each tournament.
+        crossover: probability in [0, 1] that a pair of parents is crossed.
+        mutation: probability in [0, 1] that a bit is flipped.
+        elites: the best of a generation that enter the next unchanged. They are asked
+            again and so re-evaluated: an elite can lose its place by bad luck.
+        algorithm: what it is, for configurations.
+
+    Raises:
+        ValueError: a value out of its range.
+    """
+
+    population: int = 100
+    bits: int = 8
+    tournament: int = 5
+    crossover: float = 0.85
+    mutation: float = 0.01
+    elites: int = 0
+    algorithm: Literal["genetic_algorithm"] = "genetic_algorithm"
+    # read by the configuration: a misspelt key is refused
+    __pydantic_config__: ClassVar = {"extra": "forbid"}
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        if self.population < 2:
+            raise ValueError(f"population: expected at least 2, got {self.population}")
+        if not 1 <= self.bits <= MAX_BITS:
+            raise ValueError(f"bits: expected 1 to {MAX_BITS}, got {self.bits}")
+        if self.tournament < 1:
+            raise ValueError(f"tournament: expected at least 1, got {self.tournament}")
+        if not 0 <= self.crossover <= 1:
+            raise ValueError(f"crossover: expected 0 to 1, got {self.crossover}")
+        if not 0 <= self.mutation <= 1:
+            raise ValueError(f"mutation: expected 0 to 1, got {self.mutation}")
+        if not 0 <= self.elites < self.population:
+            raise ValueError(
+                f"elites: expected 0 to population - 1 = {self.population - 1}, "
+                f"got {self.elites}"
+            )
+
+
+class GeneticAlgorithm(Optimizer):
+    """The optimiser 'ga'.
+
+    Its population are the individuals last told, good or bad.
+    """
+
+    def __init__(
+        self,
+        parameters: GeneticAlgorithmParameters,
+        space: SearchSpace,
+        rng: Generator,
+    ) -> None:
+        """Draw the initial bits; `rng` belongs to the optimiser from here on.
+
+        Raises:
+            ValueError: chromosomes of a single bit, or a space whose initial range is
+                not its bounds, which uniform bits cannot honour.
+        """
+        length = space.genes * parameters.bits
+        if length < 2:
+            raise ValueError("expected chromosomes of at least 2 bits to cross, got 1")
+        if (space.init_lower, space.init_upper) != (space.lower, space.upper):
+            raise ValueError(
+                f"ga begins with uniform bits: expected the initial range "
+                f"[{space.lower}, {space.upper}] of its bounds, "
+                f"got [{space.init_lower}, {space.init_upper}]"
+            )
+        self._parameters = parameters
+        self._space = space
+        shape = (parameters.population, length)
+        self._chromosomes = rng.integers(2, size=shape).astype(bool)
+        super().__init__("ga", self._decoded(self._chromosomes), rng)
+
+    def _propose(self) -> np.ndarray:
+        """Offspring of the generation last told, after its elites."""
+        # those of the population are of no more use
+        self._chromosomes = self._offspring()
+        return self._decoded(self._chromosomes)
+
+    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+        """Make the generation asked the current one."""
+        self.population, self.fitness = read_only(asked), read_only(told)
+
+    def _load(self, arrays: Mapping[str, np.ndarray]) -> None:
+        self._chromosomes = arrays["chromosomes"]
+        self.population = read_only(self._decoded(self._chromosomes))
+        self.fitness = read_only(arrays["fitness"])
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        arrays = super()._arrays()
+        # of which the genomes follow
+        del arrays["population"]
+        return {**arrays, "chromosomes": self._chromosomes.copy()}
+
+    def _decoded(self, chromosomes: np.ndarray) -> np.ndarray:
+        bits, space = self._parameters.bits, self._space
+        return decode(chromosomes, bits, space.lower, space.upper)
+
+    def _offspring(self) -> np.ndarray:
+        """The next generation's chromosomes `(population, length)`, elites first."""
+        parameters, rng = self._parameters, self._rng
+        # Of equals the first is the better.
+        best_first = np.argsort(-self.fitness, kind="stable")
+        elites = self._chromosomes[best_first[: parameters.elites]]
+        # Parents come in pairs; an odd last child is not used.
+        n_children = parameters.population - parameters.elites
+        n_parents = n_children + n_children % 2
+        winners = tournament_winners(
+            self.fitness, n_parents, parameters.tournament, rng
+        )
+        parents = self._chromosomes[winners]
+        children = one_point_crossover(parents, parameters.crossover, rng)
+        children = mutate(children[:n_children], parameters.mutation, rng)
+        return np.concatenate([elites, children])

@@ -1,0 +1,91 @@
+"""Random search, maximising: the baseline that learns nothing.
+
+Every generation is drawn uniformly in the initial range, whatever has been told; the
+best individuals seen so far are kept. Randomness is drawn in this order: each
+generation's genomes, the first when the optimiser is made.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.random import Generator
+
+from evolution.search.ask_tell import Optimizer, read_only
+from evolution.search.search_space import SearchSpace
+
+
+def best_of(fitness: np.ndarray, n: int) -> np.ndarray:
+    """Indices `(n,)`, ascending, of the `n` highest; of equals the first are taken.
+
+    Args:
+        fitness: `(at least n,)`.
+        n: how many.
+    """
+    best_first = np.argsort(-fitness, kind="stable")
+    return np.sort(best_first[:n])
+
+
+@dataclass(frozen=True)
+class RandomSearchParameters:
+    """What a random search is made of.
+
+    Attributes:
+        population: genomes of a generation, and individuals kept, at least 1.
+        algorithm: what it is, for configurations.
+
+    Raises:
+        ValueError: a value out of its range.
+    """
+
+    population: int = 100
+    algorithm: Literal["random_search"] = "random_search"
+    # read by the configuration: a misspelt key is refused
+    __pydantic_config__: ClassVar = {"extra": "forbid"}
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        if self.population < 1:
+            raise ValueError(f"population: expected at least 1, got {self.population}")
+
+
+class RandomSearch(Optimizer):
+    """The optimiser 'random-search'.
+
+    Its population are the best individuals seen so far, the oldest first.
+    """
+
+    def __init__(
+        self,
+        parameters: RandomSearchParameters,
+        space: SearchSpace,
+        rng: Generator,
+    ) -> None:
+        """Draw the first genomes; `rng` belongs to the optimiser from here on."""
+        self._parameters = parameters
+        self._space = space
+        super().__init__("random-search", self._drawn(rng), rng)
+
+    def to_beat(self) -> np.ndarray:
+        """See `Optimizer.to_beat`: the lowest fitness kept, -inf at first."""
+        return np.full(len(self._pending()), self.fitness.min())
+
+    def _propose(self) -> np.ndarray:
+        """Fresh genomes `(population, genes)`."""
+        return self._drawn(self._rng)
+
+    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+        """Keep the best of those kept and those asked; of equals the older."""
+        if self.generation == 0:
+            self.fitness = read_only(told)
+            return
+        seen = np.concatenate([self.population, asked])
+        fitness = np.concatenate([self.fitness, told])
+        kept = best_of(fitness, len(asked))
+        self.population, self.fitness = read_only(seen[kept]), read_only(fitness[kept])
+
+    def _drawn(self, rng: Generator) -> np.ndarray:
+        """Genomes `(population, genes)`, uniform in the initial range."""
+        space = self._space
+        shape = (self._parameters.population, space.genes)
+        return rng.uniform(space.init_lower, space.init_upper, size=shape)

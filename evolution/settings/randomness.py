@@ -1,0 +1,39 @@
+"""Randomness by what it is for: streams of one seed that never meet."""
+
+from enum import IntEnum
+
+import numpy as np
+
+from epuck_mj.step.disturbances import Disturbances
+from evolution.settings.setting import Conditions
+
+
+class Purpose(IntEnum):
+    """What randomness is for: streams of one seed that never meet."""
+
+    SEARCH = 0
+    STARTS = 1
+    VALIDATION = 2
+    TEST = 3
+    DISTURBANCES = 4
+
+
+def random_generator(seed: int, *key: int) -> np.random.Generator:
+    """The stream of `seed` for a purpose and, behind it, whatever it depends on."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
+
+
+def disturbances(
+    conditions: Conditions, n: int, steps: int, seed: int, *key: int
+) -> Disturbances | None:
+    """What `n` trials meet, if anything.
+
+    Args:
+        conditions: what the robots are like.
+        n: number of trials.
+        steps: control steps of a trial.
+        seed: of all randomness.
+        key: what the trials are for, and what else they depend on.
+    """
+    rng = random_generator(seed, Purpose.DISTURBANCES, *key)
+    return conditions.draw(rng, n, steps)

@@ -1,0 +1,209 @@
+"""Many runs: `python -m evolution.study STUDY --seeds 1-30 --output runs/paper`."""
+
+import json
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import tyro
+from tqdm import tqdm
+
+from epuck_mj.errors import UserError
+from epuck_mj.host import files
+from epuck_mj.host.command_line import command, main, parse
+from epuck_mj.host.interruption import Interrupted, Interruption
+from epuck_mj.policies import file as controller_file
+from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
+from evolution.run.directory import RunDirectory, locked
+from evolution.run.execution import Means
+from evolution.run.results import judges, scores
+from evolution.study.config import StudyConfig, find_study, parse_seeds
+from evolution.study.directory import PATIENCE, StudyDirectory
+from evolution.study.jobs import Event, Job, carry_out_side_by_side
+
+MODULE = "evolution.study"
+JOBS_MAX = 1024
+
+
+@dataclass(frozen=True)
+class Options:
+    """Run every experiment of a study with every seed; what is done is skipped.
+
+    Run s of each experiment gets the same starts. Call it again to go on after Ctrl-C,
+    a crash or a power cut, or to add seeds and experiments.
+
+    Attributes:
+        study: a shipped study (paper, wheels, transfer, quick) or a YAML file.
+        output: study directory.
+        seeds: as 1-30 or 1,3,5-8.
+        experiments: only these of the study, separated by commas.
+        jobs: runs side by side; 0 is one per core. Cores left over become threads.
+        racing: break off individuals that can only lose (--no-racing lets them live).
+            Changes no result.
+        cluster: Dask scheduler to send runs to, as tcp://host:8786, or local:4 for four
+            workers of its own. Needs the extra [cluster].
+        split: send the evaluations inside a run instead, one run at a time.
+    """
+
+    study: tyro.conf.Positional[str]
+    output: Path
+    seeds: str = "1-30"
+    experiments: str | None = None
+    jobs: int = 0
+    racing: bool = True
+    cluster: str | None = None
+    split: bool = False
+
+
+def study(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status, 1 if a run failed.
+
+    Raises:
+        UserError: for anything the user can put right.
+    """
+    options = parse(Options, f"python -m {MODULE}", argv)
+    if not 0 <= options.jobs <= JOBS_MAX:
+        raise UserError(f"expected jobs from 0 to {JOBS_MAX}, got {options.jobs}")
+    if options.split and options.cluster is None:
+        raise UserError("expected --cluster with --split: what to send evaluations to")
+    if options.jobs and options.cluster is not None:
+        raise UserError("expected --jobs or --cluster, got both: workers do the jobs")
+    if options.cluster is not None:
+        # an extra
+        from evolution.study.cluster import check_address
+
+        check_address(options.cluster)
+    seeds = parse_seeds(options.seeds)
+    config = StudyConfig.load(find_study(options.study))
+    if options.experiments is not None:
+        names = [name.strip() for name in options.experiments.split(",")]
+        config = config.only(names)
+    directory = StudyDirectory(options.output)
+    directory.open(config, seeds)
+    typed = tuple(argv)
+    # all experiments of a seed before the next: a study cut short is still paired
+    everything = [
+        Job(name, config.with_seed(name, seed), directory.run(name, seed).path, typed)
+        for seed in seeds
+        for name in config.experiments
+    ]
+    jobs = [job for job in everything if not _finished(job, directory)]
+    started = time.monotonic()
+    failed: list[Job] = []
+    with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:
+        try:
+            with interruption.raising():
+                # first: a study cut short has it, too
+                try:
+                    _measure_yardstick(directory)
+                except UserError as error:
+                    print(f"{YARDSTICK} could not be tested: {error}", file=sys.stderr)
+                events = _shown(everything, jobs, _events(jobs, options))
+                failed.extend(
+                    event.job for event in events if event.failure is not None
+                )
+        except Interrupted:
+            again = command(MODULE, *argv)
+            print(f"Interrupted; go on with: {again}", file=sys.stderr)
+            return interruption.status
+    done = len(everything) - len(failed)
+    minutes = (time.monotonic() - started) / 60
+    print(f"{done} of {len(everything)} runs are finished, {minutes:.1f} min")
+    if failed:
+        print(f"failed: {', '.join(map(str, failed))}", file=sys.stderr)
+    if done:
+        print(f"Report: {command('evolution.report', directory.path)}")
+    return 1 if failed else 0
+
+
+def _measure_yardstick(directory: StudyDirectory) -> None:
+    """Test the hand-written wall follower as champions are, unless it was before."""
+    if directory.yardstick.exists():
+        return
+    # in the setting of the first experiment
+    config = next(iter(directory.stored_config().experiments.values()))
+    tests = {
+        robot: asdict(judge.test(WallFollower()))
+        for robot, judge in judges(config).items()
+    }
+    # whoever opens the study removes what looks left over
+    with locked(directory.path, PATIENCE), files.writing():
+        text = json.dumps({"held_out": tests}, indent=1) + "\n"
+        files.write_text(directory.yardstick, text)
+
+
+def _finished(job: Job, directory: StudyDirectory) -> bool:
+    """Whether the run needs no more work; a damaged directory fails later, alone."""
+    run = directory.run(job.name, job.config.seed)
+    try:
+        return run.finished
+    except UserError:
+        return False
+
+
+def _events(jobs: Sequence[Job], options: Options) -> Iterator[Event]:
+    """The news of all jobs, wherever they are carried out."""
+    if options.cluster is not None:
+        # an extra
+        from evolution.study.cluster import carry_out_on_cluster
+
+        return carry_out_on_cluster(
+            jobs, options.cluster, options.split, options.racing
+        )
+    cores = _cores()
+    n_processes = min(options.jobs or cores, max(1, len(jobs)))
+    means = Means(threads=max(1, cores // n_processes), racing=options.racing)
+    return carry_out_side_by_side(jobs, means, n_processes)
+
+
+def _cores() -> int:
+    """Cores that this process may use: a cluster's scheduler may have given it few."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _shown(
+    everything: Sequence[Job], jobs: Sequence[Job], events: Iterator[Event]
+) -> Iterator[Event]:
+    """The same events; a bar for the study and a line for each run that ends."""
+    budget = {job: job.config.evaluations for job in everything}
+    waiting = set(jobs)
+    done = {job: 0 if job in waiting else budget[job] for job in everything}
+    finished = len(everything) - len(jobs)
+    if finished:
+        tqdm.write(f"{finished} of {len(everything)} runs were finished already")
+    with tqdm(
+        total=sum(budget.values()),
+        initial=sum(done.values()),
+        unit="eval",
+        dynamic_ncols=True,
+        disable=not sys.stderr.isatty(),
+    ) as bar:
+        for event in events:
+            if not event.ended:
+                done[event.job] = event.evaluations
+            elif event.failure is None:
+                done[event.job] = budget[event.job]
+                finished += 1
+                tqdm.write(f"{finished}/{len(everything)} {_line(event.job)}")
+                sys.stdout.flush()
+            else:
+                tqdm.write(f"{event.job} failed: {event.failure}", file=sys.stderr)
+            bar.update(sum(done.values()) - bar.n)
+            yield event
+
+
+def _line(job: Job) -> str:
+    """What a finished run has found."""
+    return f"{job}: " + scores(
+        controller_file.load(RunDirectory(job.directory).champion)
+    )
+
+
+if __name__ == "__main__":
+    main(study)

@@ -1,0 +1,237 @@
+"""The connection to a cluster: tasks, answers, and no wait that could last forever."""
+
+import asyncio
+import logging
+import re
+import time
+import uuid
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from typing import Any, cast
+
+import dask.config
+from distributed import (
+    CancelledError,
+    Client,
+    Future,
+    KilledWorker,
+    LocalCluster,
+    Security,
+    wait,
+)
+from distributed.comm.core import connect
+
+from epuck_mj.errors import UserError
+from epuck_mj.host.interruption import deaf_to_interrupts
+
+REMOTE = re.compile(r"(tcp|tls)://[^\s/]+:\d{1,5}")
+LOCAL = re.compile(r"local:([1-9]\d{0,2})")
+
+SCHEDULER_PATIENCE = 10.0
+"""How long the scheduler may take to answer [s]."""
+
+WORKERS_PATIENCE = 60.0
+"""How long the scheduler may be without a worker [s]."""
+
+TRANSFER_PATIENCE = 60.0
+"""How long a result may take from a worker to here before it is asked for again [s]."""
+
+LOOK_AFTER = 2.0
+"""How long to wait for results before looking whether anybody is there [s]."""
+
+LOGGERS = ("distributed", "distributed.client", "tornado", "tornado.application")
+
+LOCAL_SETTINGS: dict[str, Any] = {
+    "threads_per_worker": 1,
+    "memory_limit": 0,
+    "dashboard_address": "127.0.0.1:0",
+    "scheduler_kwargs": {"dashboard": False},
+    "silence_logs": logging.CRITICAL,
+}
+"""Of a cluster on this machine: as bare as can be."""
+
+QUIET = {
+    "distributed.nanny.pre-spawn-environ.DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": (
+        "critical"
+    )
+}
+"""Keeps the workers of such a cluster quiet from their first import on."""
+
+
+class ClusterLost(UserError):
+    """The cluster as a whole is of no more use; not the failure of one job."""
+
+
+def check_address(address: str) -> None:
+    """Refuse what is no address of a cluster.
+
+    Raises:
+        UserError: saying what is.
+    """
+    if not REMOTE.fullmatch(address) and not LOCAL.fullmatch(address):
+        raise UserError(
+            "expected as cluster tcp://host:8786, tls://host:8786 or, for workers on "
+            f"this machine, local:4, got '{address}'"
+        )
+
+
+class Cluster:
+    """Workers that can be given tasks; no call waits forever."""
+
+    def __init__(self, client: Client, address: str):
+        """Take a connected client; `address` is for messages."""
+        # typed as if every call could be asynchronous
+        self._client: Any = client
+        self._address = address
+        self._seen_workers = time.monotonic()
+
+    def n_threads(self) -> int:
+        """Threads of all workers together; 0 for the moment, if there is no worker.
+
+        Raises:
+            ClusterLost: if the moment has lasted too long, or nobody answers.
+        """
+        if self._client.status != "running":
+            raise self._lost()
+        try:
+            threads = self._client.nthreads(callback_timeout=SCHEDULER_PATIENCE)
+        except OSError:
+            raise self._lost() from None
+        if threads:
+            self._seen_workers = time.monotonic()
+        elif time.monotonic() - self._seen_workers > WORKERS_PATIENCE:
+            raise ClusterLost(
+                f"the scheduler at '{self._address}' has had no worker for "
+                f"{WORKERS_PATIENCE:g} s: start one with dask worker {self._address}"
+            )
+        return sum(threads.values())
+
+    def submit(self, name: str, function: Callable, *args: Any) -> Future:
+        """A task for some worker, or for another one if that should die.
+
+        Raises:
+            ClusterLost: if there is nobody to take it.
+        """
+        if self._client.status != "running":
+            raise self._lost()
+        # never the key of another task, which Dask would take for the same
+        key = f"{name}-{uuid.uuid4().hex}"
+        return self._client.submit(function, *args, key=key, pure=False)
+
+    def answers(self, futures: Collection[Future]) -> dict[Future, Any]:
+        """What those gave that have ended: a result, or the exception it ended with.
+
+        Waits until there is one, but no longer than a while.
+
+        Raises:
+            ClusterLost: as `n_threads`.
+        """
+        answers: dict[Future, Any] = {}
+        try:
+            with self._client.as_current():
+                waited = wait(list(futures), LOOK_AFTER, "FIRST_COMPLETED")
+                ended = cast(Any, waited).done
+            for future in ended:
+                # if a worker dies before it has handed over, another begins again
+                with suppress(TimeoutError):
+                    answers[future] = _answer(future)
+        except CancelledError:
+            raise self._lost() from None
+        except TimeoutError:
+            # whoever waits for nobody hears of it here
+            self.n_threads()
+        return answers
+
+    def results(self, futures: Sequence[Future]) -> list[Any]:
+        """What all tasks gave, in their order.
+
+        Raises:
+            ClusterLost: as `n_threads`.
+            Exception: whatever a task raised.
+        """
+        results: dict[Future, Any] = {}
+        while len(results) < len(futures):
+            missing = [future for future in futures if future not in results]
+            for future, answer in self.answers(missing).items():
+                if isinstance(answer, Exception):
+                    raise answer
+                results[future] = answer
+        return [results[future] for future in futures]
+
+    def _lost(self) -> ClusterLost:
+        return ClusterLost(
+            f"lost the scheduler at '{self._address}'; finished runs are kept: start "
+            "it again and repeat the command"
+        )
+
+
+def _answer(future: Any) -> Any:
+    """What the task of an ended future gave, or the exception it ended with.
+
+    Raises:
+        TimeoutError: if it does not come.
+    """
+    if future.status != "error":
+        return future.result(TRANSFER_PATIENCE)
+    error = future.exception(TRANSFER_PATIENCE)
+    if isinstance(error, KilledWorker):
+        return UserError(
+            f"{error.allowed_failures + 1} workers died while they did it: killed, or "
+            "out of memory? Their logs may tell"
+        )
+    assert isinstance(error, Exception)
+    return error.with_traceback(future.traceback(TRANSFER_PATIENCE))
+
+
+@contextmanager
+def connected(address: str) -> Iterator[Cluster]:
+    """The cluster at an address of `carry_out_on_cluster`.
+
+    Raises:
+        UserError: if nobody answers there.
+    """
+    # its news are for those who run the cluster; what concerns us is raised
+    for name in LOGGERS:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    with ExitStack() as stack:
+        local = LOCAL.fullmatch(address)
+        if local is None:
+            _greet(address)
+            scheduler = address
+        else:
+            with deaf_to_interrupts(), dask.config.set(QUIET):
+                scheduler = LocalCluster(n_workers=int(local[1]), **LOCAL_SETTINGS)
+            stack.callback(scheduler.close)
+        client = Client(scheduler, timeout=SCHEDULER_PATIENCE, set_as_default=False)
+        stack.callback(_close, client)
+        yield Cluster(client, address)
+
+
+def _greet(address: str) -> None:
+    """Make sure of a scheduler: a client would wait for a mute one forever.
+
+    Raises:
+        UserError: if there is none.
+    """
+
+    async def greet() -> None:
+        arguments = Security().get_connection_args("client")
+        greeting = connect(address, SCHEDULER_PATIENCE, **arguments)
+        comm = await asyncio.wait_for(greeting, SCHEDULER_PATIENCE)
+        await comm.close()
+
+    try:
+        asyncio.run(greet())
+    # a stranger's answer can be anything
+    except Exception as error:
+        reason = " ".join(str(error).split()) or "no answer"
+        raise UserError(
+            f"no Dask scheduler at '{address}' (start one with dask scheduler): "
+            + reason
+        ) from None
+
+
+def _close(client: Client) -> None:
+    """Leave; the scheduler drops every task that nobody else waits for."""
+    with suppress(TimeoutError):
+        client.close(SCHEDULER_PATIENCE)

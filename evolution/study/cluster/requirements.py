@@ -1,0 +1,92 @@
+"""What has to be the same on a worker as here, or its bits would be others."""
+
+import hashlib
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Self
+
+from distributed import get_worker
+
+import epuck_mj
+import evolution
+from epuck_mj.errors import UserError
+from epuck_mj.scene.model import load_scene
+from evolution.judging.held_out import WHEELED_ROBOT
+from evolution.settings.config import ExperimentConfig
+
+DECIDING = ("epuck-mj", "mujoco", "numpy", "scipy", "contourpy", "cmaes")
+"""Packages whose version decides over the bits."""
+
+
+@dataclass(frozen=True)
+class Requirements:
+    """What decides over the bits of a trial, but for controller, start and task.
+
+    Attributes:
+        robot: shipped robot, or the path of an MJCF file.
+        arena: shipped arena, or the path of an MJCF file.
+        control_step: duration of a control step [s].
+        facts: what has to be the same everywhere, and what it is here.
+    """
+
+    robot: str
+    arena: str
+    control_step: float
+    facts: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def here(cls, robot: str, arena: str, control_step: float) -> Self:
+        """As it is on this machine.
+
+        Raises:
+            UserError: if robot or arena cannot be used.
+        """
+        facts = {package: version(package) for package in DECIDING}
+        facts["code of epuck-mj"] = code()
+        for name in (robot, WHEELED_ROBOT):
+            scene = load_scene(name, arena, control_step)
+            for part, sha256 in scene.sha256.items():
+                facts[f"{part} of '{name}' in '{arena}'"] = sha256[:12]
+        return cls(robot, arena, control_step, tuple(facts.items()))
+
+    def refuse_another(self) -> None:
+        """On a worker: refuse to give other bits than the machine that asks would get.
+
+        Raises:
+            UserError: naming what differs.
+        """
+        here = Requirements.here(self.robot, self.arena, self.control_step)
+        ours, theirs = dict(here.facts), dict(self.facts)
+        differing = [
+            f"{name} (there {ours.get(name)}, here {theirs.get(name)})"
+            for name in {**theirs, **ours}
+            if ours.get(name) != theirs.get(name)
+        ]
+        if differing:
+            raise UserError(
+                f"worker {get_worker().address} would give other results; these "
+                f"differ: {', '.join(differing)}"
+            )
+
+
+@cache
+def code() -> str:
+    """First digits of a hash of this project's Python, of which no version tells."""
+    digest = hashlib.sha256()
+    for package in (epuck_mj, evolution):
+        root = Path(str(package.__file__)).parent
+        for path in sorted(root.rglob("*.py")):
+            digest.update(path.relative_to(root).as_posix().encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def requirements_of(config: ExperimentConfig) -> Requirements:
+    """What a run requires, as it is on this machine.
+
+    Raises:
+        UserError: if robot or arena cannot be used.
+    """
+    return Requirements.here(config.robot, config.arena, config.control_step)

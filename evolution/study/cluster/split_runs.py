@@ -1,0 +1,86 @@
+"""Split runs: evolution goes on here, one run at a time; trials are lived elsewhere."""
+
+import math
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+
+from epuck_mj.scene.model import load_scene
+from epuck_mj.step.control import TaskParameters, Trials
+from evolution.judging.evaluation import CAPACITY, BatchEngine, Work, joined
+from evolution.run.execution import Means
+from evolution.settings.config import ExperimentConfig
+from evolution.study.cluster.connection import Cluster, ClusterLost
+from evolution.study.cluster.requirements import Requirements, requirements_of
+from evolution.study.jobs import Event, Job, failure_log, failure_of, generations
+
+CHUNKS_PER_THREAD = 2
+"""Parts of a generation for each thread: more even out, fewer cost less to send."""
+
+ENGINES_KEPT = 4
+"""Engines that a thread of a worker keeps for its next chunks."""
+
+
+def split_runs(jobs: Sequence[Job], cluster: Cluster, racing: bool) -> Iterator[Event]:
+    """One job after the other, each spread over all workers."""
+    for job in jobs:
+        failure = None
+        try:
+            means = Means(ClusterEngine(cluster, job.config), racing=racing)
+            with closing(generations(job, means)) as steps:
+                for evaluations in steps:
+                    yield Event(job, evaluations)
+            failure_log(job.directory).unlink(missing_ok=True)
+        except ClusterLost:
+            raise
+        except Exception as error:
+            failure = failure_of(job, error)
+        yield Event(job, ended=True, failure=failure)
+
+
+class ClusterEngine:
+    """Trials in parts, wherever a thread is free; see `evaluation.Engine`."""
+
+    def __init__(self, cluster: Cluster, config: ExperimentConfig):
+        """Find out what has to be the same everywhere.
+
+        Raises:
+            UserError: if robot or arena cannot be used.
+        """
+        self._cluster = cluster
+        self._required = requirements_of(config)
+        self._task = config.task
+
+    def __str__(self) -> str:
+        """Its name in a run's provenance."""
+        return "cluster"
+
+    def run(self, work: Work) -> Trials:
+        """See `Engine.run`.
+
+        Raises:
+            UserError: if the cluster is lost, or a worker refuses.
+        """
+        n_chunks = CHUNKS_PER_THREAD * max(1, self._cluster.n_threads())
+        most = min(CAPACITY, math.ceil(len(work) / n_chunks))
+        futures = [
+            self._cluster.submit("trials", _trials, self._required, self._task, part)
+            for part in work.chunks(most)
+        ]
+        return joined(self._cluster.results(futures))
+
+
+def _trials(required: Requirements, task: TaskParameters, part: Work) -> Trials:
+    """On a worker: `Engine.run` of a part of the work."""
+    # a thread's own: an engine runs one batch at a time
+    engines = _kept.__dict__.setdefault("engines", {})
+    if (required, task) not in engines:
+        required.refuse_another()
+        if len(engines) == ENGINES_KEPT:
+            engines.clear()
+        scene = load_scene(required.robot, required.arena, required.control_step)
+        engines[required, task] = BatchEngine(scene, task, threads=1)
+    return engines[required, task].run(part)
+
+
+_kept = threading.local()

@@ -1,0 +1,181 @@
+"""What a study is: experiments that are run with the same seeds and compared."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Self
+
+from epuck_mj.errors import UserError
+from epuck_mj.host.files import find
+from epuck_mj.host.yaml_and_json import read_yaml, to_yaml
+from evolution.settings.config import ExperimentConfig, differing_keys
+from evolution.settings.config_files import find_config, load_config, shipped_with
+
+KEYS = ("experiments", "common")
+
+
+@dataclass(frozen=True)
+class StudyConfig:
+    """Experiments by name, in the order of every table and figure.
+
+    Attributes:
+        experiments: the config of each, whose seed is not used.
+    """
+
+    experiments: Mapping[str, ExperimentConfig]
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Read a study: `experiments`, a list, and `common`, keys that all share.
+
+        Each experiment is a shipped one or a YAML file; what `common` says wins.
+
+        Raises:
+            UserError: if a file is missing or says something unknown.
+        """
+        content = read_yaml(path)
+        unknown = [key for key in content if key not in KEYS]
+        if unknown:
+            raise UserError(
+                f"'{path}': unknown key '{unknown[0]}'; available: {', '.join(KEYS)}"
+            )
+        names, common = content.get("experiments"), content.get("common") or {}
+        if not isinstance(names, list) or not names:
+            raise UserError(
+                f"'{path}': expected 'experiments', a list of experiments, got {names}"
+            )
+        if not isinstance(common, dict):
+            raise UserError(f"'{path}': expected 'common', a mapping, got {common}")
+        experiments: dict[str, ExperimentConfig] = {}
+        for name in map(str, names):
+            file = find_config(name)
+            if file.stem in experiments:
+                raise UserError(f"'{path}': two experiments are called '{file.stem}'")
+            fields = load_config(file).model_dump() | common
+            config = ExperimentConfig.parsed(fields, f"'{path}', common")
+            experiments[file.stem] = config.located()
+        return cls(MappingProxyType(experiments))
+
+    def only(self, names: list[str]) -> Self:
+        """The experiments of those names.
+
+        Raises:
+            UserError: if one is not in the study.
+        """
+        for name in names:
+            if name not in self.experiments:
+                raise UserError(
+                    f"no experiment '{name}' in the study; available: "
+                    + ", ".join(self.experiments)
+                )
+        chosen = {name: self.experiments[name] for name in names}
+        return type(self)(MappingProxyType(chosen))
+
+    def with_seed(self, name: str, seed: int) -> ExperimentConfig:
+        """The config of one run."""
+        return self.experiments[name].model_copy(update={"seed": seed})
+
+    def merged(self, other: Self, path: Path) -> Self:
+        """This study, as it is stored at `path`, and the experiments of another.
+
+        Raises:
+            UserError: naming the keys in which an experiment of both differs.
+        """
+        for name, config in other.experiments.items():
+            if name not in self.experiments:
+                continue
+            differing = differing_keys(self.experiments[name], config)
+            if differing:
+                raise UserError(
+                    f"'{path}' is a study of another config; experiment '{name}' "
+                    f"differs in: {', '.join(differing)}"
+                )
+        return type(self)(MappingProxyType({**self.experiments, **other.experiments}))
+
+    def to_yaml(self) -> str:
+        """All experiments with all their keys, as `from_yaml` reads them."""
+        fields = {name: c.model_dump() for name, c in self.experiments.items()}
+        return to_yaml(fields)
+
+    @classmethod
+    def from_yaml(cls, path: Path) -> Self:
+        """What `to_yaml` wrote to a file.
+
+        Raises:
+            UserError: if it is not there, or damaged.
+        """
+        experiments = {
+            str(name): ExperimentConfig.parsed(fields, f"'{path}', {name}")
+            for name, fields in read_yaml(path).items()
+        }
+        if not experiments:
+            raise UserError(f"'{path}': expected experiments, got none")
+        return cls(MappingProxyType(experiments))
+
+
+def find_study(study: str) -> Path:
+    """The file of a shipped study, or the user's own.
+
+    Raises:
+        UserError: if there is none.
+    """
+    return find(study, "study", shipped_with("experiments"), "a YAML")
+
+
+def parse_seeds(text: str) -> list[int]:
+    """Seeds of `1-30` or `1,3,5-8`, in ascending order.
+
+    Raises:
+        UserError: if it says anything else, or names a seed twice.
+    """
+    seeds: list[int] = []
+    for part in text.split(","):
+        ends = SEEDS.fullmatch(part.strip())
+        if ends is None:
+            raise UserError(f"expected seeds as 1-30 or 1,3,5-8, got '{text}'")
+        low, high = int(ends[1]), int(ends[2] or ends[1])
+        if not low <= high < low + SEEDS_MAX:
+            raise UserError(
+                f"expected seeds from a lower to a higher one, at most {SEEDS_MAX}, "
+                f"got '{part}'"
+            )
+        seeds += range(low, high + 1)
+    if len(set(seeds)) < len(seeds):
+        raise UserError(f"expected every seed once, got '{text}'")
+    return sorted(seeds)
+
+
+def seeds_text(seeds: Sequence[int]) -> str:
+    """Ascending seeds as the command line takes them: 1-3,7."""
+    groups: list[list[int]] = []
+    for seed in seeds:
+        if groups and seed == groups[-1][-1] + 1:
+            groups[-1].append(seed)
+        else:
+            groups.append([seed])
+    return ",".join(
+        str(group[0]) if len(group) == 1 else f"{group[0]}-{group[-1]}"
+        for group in groups
+    )
+
+
+def seeds_to_yaml(seeds: Mapping[str, Sequence[int]]) -> str:
+    """Ascending seeds of experiments by name, as `seeds_from_yaml` reads them."""
+    texts = {name: seeds_text(each) for name, each in seeds.items()}
+    return to_yaml(texts)
+
+
+def seeds_from_yaml(path: Path) -> dict[str, list[int]]:
+    """What `seeds_to_yaml` wrote to a file.
+
+    Raises:
+        UserError: if it is damaged.
+    """
+    stored = read_yaml(path)
+    return {str(name): parse_seeds(str(text)) for name, text in stored.items()}
+
+
+SEEDS = re.compile(r"(\d{1,18})(?:-(\d{1,18}))?", re.ASCII)
+SEEDS_MAX = 10_000

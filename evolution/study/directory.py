@@ -1,0 +1,114 @@
+"""The study directory: one run directory per experiment and seed, and what they are."""
+
+from collections.abc import Collection
+from pathlib import Path
+
+from epuck_mj.errors import UserError
+from epuck_mj.host import files
+from evolution.run.directory import LOCK, RunDirectory, locked
+from evolution.study.config import StudyConfig, seeds_from_yaml, seeds_to_yaml
+
+PREFIX = "seed-"
+
+PATIENCE = 10.0
+"""How long to wait for another process that opens the same study [s]."""
+
+
+def champions(place: Path) -> list[Path]:
+    """The champion of the run at a place, or those of all runs of the study there."""
+    if not files.is_directory(place):
+        return []
+    run = RunDirectory(place)
+    if files.is_file(run.champion):
+        return [run.champion]
+    study = StudyDirectory(place)
+    return [
+        path
+        for name in sorted(each.name for each in place.iterdir() if each.is_dir())
+        for seed in study.seeds(name)
+        if files.is_file(path := study.run(name, seed).champion)
+    ]
+
+
+class StudyDirectory:
+    """`study.yaml` and `<experiment>/seed-<n>/`, each as a single run leaves it."""
+
+    def __init__(self, path: Path):
+        """Name the directory; nothing is touched yet."""
+        self.path = path
+        self.config = path / "study.yaml"
+        self.asked = path / "seeds.yaml"
+        self.yardstick = path / "wall-follower.json"
+
+    def run(self, name: str, seed: int) -> RunDirectory:
+        """The directory of one run."""
+        return RunDirectory(self.path / name / f"{PREFIX}{seed}")
+
+    def seeds(self, name: str) -> list[int]:
+        """Seeds of which there is a directory, in ascending order."""
+        found = (path.name for path in (self.path / name).glob(f"{PREFIX}*/"))
+        numbers = (part.removeprefix(PREFIX) for part in found)
+        # not seed-01, a copy that a person made: it would count as seed 1 again
+        return sorted(int(n) for n in numbers if n.isdecimal() and str(int(n)) == n)
+
+    def asked_seeds(self) -> dict[str, list[int]]:
+        """Seeds that were ever asked for, by experiment; older studies do not say.
+
+        Raises:
+            UserError: if the file that says so is damaged.
+        """
+        if not files.is_file(self.asked):
+            return {}
+        return seeds_from_yaml(self.asked)
+
+    def open(self, config: StudyConfig, seeds: Collection[int]) -> None:
+        """Make the directory, or go on with it; experiments and seeds may join.
+
+        Raises:
+            UserError: if it is something else, another study, or cannot be written.
+        """
+        if files.is_file(self.path):
+            raise UserError(f"output '{self.path}' is not a directory")
+        with files.writing():
+            # in this order: another process may write the study meanwhile
+            if self._holds_anything() and not files.is_file(self.config):
+                raise UserError(
+                    f"output '{self.path}' is not empty and holds no study: expected "
+                    "a new directory, or one with a study.yaml"
+                )
+            # somebody else may be about to add experiments or seeds
+            with locked(self.path, PATIENCE):
+                files.remove_leftovers(self.path)
+                asked = self.asked_seeds()
+                if not asked and files.is_file(self.config):
+                    # an older study did not say
+                    begun = self.stored_config().experiments
+                    asked = {n: there for n in begun if (there := self.seeds(n))}
+                for name in config.experiments:
+                    asked[name] = sorted({*asked.get(name, ()), *seeds})
+                if files.is_file(self.config):
+                    config = self.stored_config().merged(config, self.path)
+                files.write_text(self.config, config.to_yaml())
+                files.write_text(self.asked, seeds_to_yaml(asked))
+
+    def _holds_anything(self) -> bool:
+        """Whether more is there than what a killed writer left behind."""
+        if not files.is_directory(self.path):
+            return False
+        return any(
+            path.name != LOCK and not files.is_leftover(path)
+            for path in self.path.iterdir()
+        )
+
+    def stored_config(self) -> StudyConfig:
+        """The study that is there.
+
+        Raises:
+            UserError: if there is none, or it is damaged.
+        """
+        if not files.is_file(self.config):
+            raise UserError(
+                f"'{self.path}' is not a study: expected a file '{self.config}', as "
+                "python -m evolution.study writes it"
+            )
+        return StudyConfig.from_yaml(self.config)
