@@ -22,8 +22,13 @@ from epuck_mj.policies.file import load
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.mujoco_batch import SimulatedRobots
 from epuck_mj.scene.model import Scene, load_scene
-from epuck_mj.scene.starts import START_CLEARANCE, FreeSpace
-from epuck_mj.step.control import BatchPolicy, TaskParameters, run_trials
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.control import (
+    START_CLEARANCE,
+    BatchPolicy,
+    TaskParameters,
+    run_trials,
+)
 
 HERE = Path(__file__).resolve().parent
 CHAMPIONS = HERE.parent / "results" / "paper" / "de-best"

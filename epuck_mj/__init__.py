@@ -1,11 +1,34 @@
 """A MuJoCo e-puck: model, sensors, motors, controllers and dm_control tasks."""
 
+import importlib
 import os
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from epuck_mj.environments.dm_control import SUITE, load
+    from epuck_mj.errors import UserError
+    from epuck_mj.scene.model import load_scene
 
 # Nothing here draws: without this, a machine without a display prints GLFW warnings.
 os.environ.setdefault("MUJOCO_GL", "disabled")
 
-from epuck_mj.environments.dm_control import SUITE, load
-from epuck_mj.errors import UserError
+__all__ = ["SUITE", "UserError", "load", "load_scene"]
 
-__all__ = ["SUITE", "UserError", "load"]
+_MODULES = {
+    "SUITE": "epuck_mj.environments.dm_control",
+    "UserError": "epuck_mj.errors",
+    "load": "epuck_mj.environments.dm_control",
+    "load_scene": "epuck_mj.scene.model",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, whose module is imported by the first who asks (PEP 562)."""
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_MODULES[name]), name)
+
+
+def __dir__() -> list[str]:
+    """All public names, imported or not."""
+    return sorted({*globals(), *__all__})

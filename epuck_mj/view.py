@@ -27,8 +27,8 @@ from epuck_mj.policies.file import load
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.single import WatchedRobot
 from epuck_mj.scene.model import Scene, load_scene
-from epuck_mj.scene.starts import START_CLEARANCE, FreeSpace
-from epuck_mj.step.control import Policy, TaskParameters, drive
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.control import START_CLEARANCE, Policy, TaskParameters, drive
 
 LATE_MAX = 0.2
 """How late the picture may be before time that was lost is given up [s]."""

@@ -15,8 +15,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.policies import file as controller_file
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
-from epuck_mj.scene.starts import START_CLEARANCE
-from epuck_mj.step.control import Policy, TaskParameters
+from epuck_mj.step.control import START_CLEARANCE, Policy, TaskParameters
 from evolution.run.directory import RunDirectory
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import load_config

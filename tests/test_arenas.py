@@ -10,10 +10,10 @@ from scipy import spatial
 
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.scene.clearance import ClearanceProbe
-from epuck_mj.scene.mjcf import MODELS
 from epuck_mj.scene.model import load_scene
-from epuck_mj.scene.starts import START_CLEARANCE, FreeSpace
-from epuck_mj.step.control import TaskParameters
+from epuck_mj.scene.model_files import MODELS
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.control import START_CLEARANCE, TaskParameters
 from evolution.judging.held_out import Judge
 
 ARENAS = sorted(MODELS.glob("arenas/*.xml"))

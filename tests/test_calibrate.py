@@ -44,8 +44,8 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import SIGNALS
 from epuck_mj.rungs.disturbed import DisturbedRobots
 from epuck_mj.rungs.mujoco_batch import SimulatedRobots
-from epuck_mj.scene.mjcf import MODELS
 from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.model_files import MODELS
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.disturbances import Noise, calibrated
 from epuck_mj.step.motors import STEP_ANGLE

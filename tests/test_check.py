@@ -16,7 +16,7 @@ from epuck_mj.check.findings import Severity
 from epuck_mj.check.source import read
 from epuck_mj.check.walls import seen_by_rays
 from epuck_mj.errors import UserError
-from epuck_mj.scene.mjcf import MODELS
+from epuck_mj.scene.model_files import MODELS
 from epuck_mj.scene.robot_parts import ROBOT_BODY
 
 ROBOTS = ("epuck", "epuck_planar")

@@ -8,8 +8,8 @@ from epuck_mj import constants as c
 from epuck_mj.check import check_arena
 from epuck_mj.check.findings import Severity
 from epuck_mj.errors import UserError
-from epuck_mj.scene.mjcf import MODELS
 from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.model_files import MODELS
 from epuck_mj.scene.robot_parts import PROXIMITY
 
 

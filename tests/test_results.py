@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.publish import shipped, with_tables
-from epuck_mj.scene.mjcf import MODELS
+from epuck_mj.scene.model_files import MODELS
 from evolution.gap.document import document, summary
 from evolution.gap.groups import experiments, peers
 from evolution.gap.transfer import Transfer

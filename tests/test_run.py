@@ -25,7 +25,7 @@ from rerun.chunk import RrdReader
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.policies import file as controller_file
-from epuck_mj.scene.mjcf import MODELS
+from epuck_mj.scene.model_files import MODELS
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.trials.trajectory import Trajectory
 from evolution.judging import starts

@@ -10,7 +10,7 @@ import yaml
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.scene.mjcf import MODELS
+from epuck_mj.scene.model_files import MODELS
 from evolution.run.directory import locked
 from evolution.settings.config_files import find_config, load_config
 from evolution.study.config import StudyConfig, find_study, parse_seeds

@@ -15,8 +15,8 @@ from epuck_mj.errors import UserError
 from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
-from epuck_mj.scene.mjcf import MODELS
 from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.model_files import MODELS
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters, drive
 from epuck_mj.trials.trajectory import record

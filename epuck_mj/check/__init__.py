@@ -18,9 +18,10 @@ from epuck_mj.check.source import TOPIC, Source, compiled, read
 from epuck_mj.check.speed import speed_findings
 from epuck_mj.check.walls import finite_findings, plane_findings, wall_findings
 from epuck_mj.errors import UserError
-from epuck_mj.scene.mjcf import find_arena, find_robot
 from epuck_mj.scene.model import Scene, load_scene
-from epuck_mj.scene.starts import START_CLEARANCE, FreeSpace, Grid, survey
+from epuck_mj.scene.model_files import find_arena, find_robot
+from epuck_mj.scene.starts import FreeSpace, Grid, survey
+from epuck_mj.step.control import START_CLEARANCE
 
 SUBSTEPS_MAX = 10_000
 """Most physics steps in a control step: nobody would wait for more."""

@@ -13,7 +13,7 @@ import tyro
 from epuck_mj.check import check_arena, report
 from epuck_mj.check.picture import region_figure
 from epuck_mj.host.command_line import main, parse
-from epuck_mj.scene.mjcf import SHIPPED_ROBOTS
+from epuck_mj.scene.model_files import SHIPPED_ROBOTS
 from epuck_mj.show.pictures import save_figure
 
 

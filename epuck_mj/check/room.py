@@ -10,7 +10,8 @@ from epuck_mj.errors import UserError
 from epuck_mj.scene.clearance import CLEARANCE_MAX, ClearanceProbe
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.outline import shell_outline
-from epuck_mj.scene.starts import START_CLEARANCE, FreeSpace, Grid, enclosed
+from epuck_mj.scene.starts import FreeSpace, Grid, enclosed
+from epuck_mj.step.control import START_CLEARANCE
 
 TOPIC = "room"
 SAMPLE = 64

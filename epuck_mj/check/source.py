@@ -16,7 +16,8 @@ import mujoco
 from epuck_mj.check.findings import Place, Unusable, error
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import is_file, read_text
-from epuck_mj.scene.mjcf import SHIPPED_ROBOTS, SceneText, find_assets, with_robot
+from epuck_mj.scene.mjcf import SceneText, find_assets, with_robot
+from epuck_mj.scene.model_files import SHIPPED_ROBOTS
 from epuck_mj.scene.robot_parts import ROBOT_BODY
 
 TOPIC = "file"

@@ -17,7 +17,7 @@ from epuck_mj.scene.clearance import CONVEX
 from epuck_mj.scene.geometry import at_rest, box_around, kinematics, mesh, walls
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL, can_touch, static
-from epuck_mj.scene.starts import START_CLEARANCE
+from epuck_mj.step.control import START_CLEARANCE
 
 TOPIC = "walls"
 NAMES_MAX = 6

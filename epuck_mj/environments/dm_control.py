@@ -23,8 +23,8 @@ from dm_env import specs
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
 from epuck_mj.scene.model import Scene, load_scene
-from epuck_mj.scene.starts import START_CLEARANCE, FreeSpace
-from epuck_mj.step.control import TaskParameters
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.control import START_CLEARANCE, TaskParameters
 from epuck_mj.step.motors import command
 from epuck_mj.step.sensors import Reading, observe
 

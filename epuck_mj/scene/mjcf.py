@@ -1,55 +1,20 @@
-"""The MJCF of a scene as text: where it is, and an arena with its robot exchanged."""
+"""MJCF in, compiled model out: an arena with its robot exchanged."""
 
+import hashlib
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.files import find, is_file, read_text
-from epuck_mj.scene.robot_parts import ROBOT_BODY
+from epuck_mj.host.files import is_file, read_text
+from epuck_mj.scene.model_files import SHIPPED_ROBOTS
+from epuck_mj.scene.robot_parts import ROBOT_BODY, TIMESTEP
 
-_HERE = Path(__file__).resolve().parent.parent
-# beside the package in a checkout, inside it where the wheel is installed
-MODELS = next(
-    folder for folder in (_HERE / "models", _HERE.parent / "models") if folder.is_dir()
-)
-SHIPPED_ROBOTS = ("epuck.xml", "epuck_planar.xml")
 ADDED_ROBOT = "robot added to the arena.xml"
-
-
-def absolute(name: str) -> str:
-    """The name of a robot or arena; if it is a path, from the root on."""
-    path = Path(name)
-    shipped = {file.stem for file in MODELS.rglob("*.xml")}
-    return name if name in shipped or not is_file(path) else str(path.resolve())
-
-
-def find_robot(name: str) -> Path:
-    """The file of a shipped robot, or the user's own.
-
-    Raises:
-        UserError: if there is none.
-    """
-    return _find(name, "robot", [MODELS / robot for robot in SHIPPED_ROBOTS])
-
-
-def find_arena(name: str) -> Path:
-    """The file of a shipped arena, or the user's own.
-
-    Raises:
-        UserError: if there is none.
-    """
-    arenas = [MODELS / "arena.xml", *sorted(MODELS.glob("arenas/*.xml"))]
-    return _find(name, "arena", arenas)
-
-
-def _find(name: str, kind: str, shipped: list[Path]) -> Path:
-    """The file of a shipped model, or the user's own."""
-    by_name = {path.stem: path for path in shipped}
-    return find(name, kind, by_name, "an MJCF").resolve()
 
 
 @dataclass(frozen=True)
@@ -69,6 +34,35 @@ class SceneText:
     paths: Mapping[str, Path]
     arena: Path
     robot: Path
+
+
+def compiled(arena: Path, robot: Path) -> tuple[mujoco.MjModel, dict[str, str]]:
+    """The model of a robot in an arena, and SHA-256 of every file that is in it.
+
+    The hashes are called `arena`, `robot`, and by name for all other files.
+
+    Raises:
+        UserError: if a file is missing, or MuJoCo cannot compile it.
+    """
+    # compiled alone first: errors in an included file have no line number
+    with _complaints(robot):
+        mujoco.MjSpec.from_file(str(robot)).compile()
+    scene = with_robot(arena, robot)
+    with _complaints(arena):
+        spec = mujoco.MjSpec.from_string(scene.text, include=dict(scene.files))
+        assets = find_assets(spec, scene)
+        # a robot that brings its converged step wants no other from the arena
+        step = spec.numeric(TIMESTEP)
+        if step is not None:
+            spec.option.timestep = step.data[0]
+        model = spec.compile()
+    contents = {"arena": scene.text.encode()}
+    for name, content in scene.files.items():
+        contents["robot" if scene.paths[name] == robot else name] = content
+    contents |= {name: path.read_bytes() for name, path in assets.items()}
+    return model, {
+        name: hashlib.sha256(content).hexdigest() for name, content in contents.items()
+    }
 
 
 def with_robot(arena: Path, robot: Path) -> SceneText:
@@ -157,3 +151,13 @@ def _included(path: Path) -> str:
 
 def _has_robot(text: str, path: Path) -> bool:
     return _parse(text, path).find(f".//body[@name='{ROBOT_BODY}']") is not None
+
+
+@contextmanager
+def _complaints(source: Path) -> Iterator[None]:
+    """MuJoCo's complaints about a file on one line."""
+    try:
+        yield
+    except ValueError as error:
+        message = " ".join(str(error).split())
+        raise UserError(f"MuJoCo cannot compile '{source}': {message}") from None

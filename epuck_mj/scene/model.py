@@ -5,9 +5,7 @@ the whole scene; `load_scene` puts the robot asked for in that one's place. Robo
 differ in their base and nothing else: everybody else calls `Scene.qpos` and friends.
 """
 
-import hashlib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,12 +14,12 @@ import mujoco
 import numpy as np
 
 from epuck_mj.errors import UserError
-from epuck_mj.scene.mjcf import find_arena, find_assets, find_robot, with_robot
+from epuck_mj.scene.mjcf import compiled
+from epuck_mj.scene.model_files import find_arena, find_robot
 from epuck_mj.scene.robot_parts import (
     PROXIMITY,
     ROBOT_BODY,
     SHELL,
-    TIMESTEP,
     WHEELS,
     check_base,
     check_floor,
@@ -104,37 +102,8 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
         UserError: if a file is missing or broken, or a part of the robot is.
     """
     robot_path, arena_path = find_robot(robot), find_arena(arena)
-    # compiled alone first: errors in an included file have no line number
-    with _complaints(robot_path):
-        mujoco.MjSpec.from_file(str(robot_path)).compile()
-    scene = with_robot(arena_path, robot_path)
-    with _complaints(arena_path):
-        spec = mujoco.MjSpec.from_string(scene.text, include=dict(scene.files))
-        assets = find_assets(spec, scene)
-        # a robot that brings its converged step wants no other from the arena
-        step = spec.numeric(TIMESTEP)
-        if step is not None:
-            spec.option.timestep = step.data[0]
-        model = spec.compile()
-    contents = {"arena": scene.text.encode()}
-    for name, content in scene.files.items():
-        own = scene.paths[name] == robot_path
-        contents["robot" if own else name] = content
-    contents |= {name: path.read_bytes() for name, path in assets.items()}
-    sha256 = {
-        name: hashlib.sha256(content).hexdigest() for name, content in contents.items()
-    }
+    model, sha256 = compiled(arena_path, robot_path)
     return _index(model, robot_path, arena_path, sha256, control_step)
-
-
-@contextmanager
-def _complaints(source: Path) -> Iterator[None]:
-    """MuJoCo's complaints about a file on one line."""
-    try:
-        yield
-    except ValueError as error:
-        message = " ".join(str(error).split())
-        raise UserError(f"MuJoCo cannot compile '{source}': {message}") from None
 
 
 def _index(

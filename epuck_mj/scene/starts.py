@@ -23,8 +23,6 @@ NODES_MAX = 400
 SPACING_MIN = 0.01
 """Grid spacing [m], unless the arena is larger than NODES_MAX of it."""
 
-START_CLEARANCE = 0.01
-"""Least distance to a wall at a start, if nobody says otherwise [m]. Chosen."""
 
 BLOCK = 64
 """Candidates drawn at once; part of what a seed means."""

@@ -17,7 +17,10 @@ from epuck_mj.step.motors import Speeds, command
 from epuck_mj.step.sensors import Reading, observe
 
 STEPS_MAX = 10_000_000
-"""Of a trial: more is a mistake."""
+"""Most control steps of a trial: more is a mistake."""
+
+START_CLEARANCE = 0.01
+"""Least distance to a wall at a start, if nobody says otherwise [m]. Chosen."""
 
 Policy = Callable[[np.ndarray], np.ndarray]
 

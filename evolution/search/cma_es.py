@@ -17,10 +17,9 @@ Source:
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
-from cmaes import CMA
 from numpy.random import Generator
 
 from evolution.search.ask_tell import (
@@ -31,6 +30,9 @@ from evolution.search.ask_tell import (
     restored_generator,
 )
 from evolution.search.search_space import SearchSpace, refuse_wide_steps
+
+if TYPE_CHECKING:
+    from cmaes import CMA
 
 # With a single parent, half of 3, `cmaes` divides by a learning rate of 0.
 MIN_POPULATION = 4
@@ -166,8 +168,11 @@ class CmaEs(Optimizer):
         recent = np.array(self._history[-window:])
         return self._cma.should_stop() or has_stagnated(recent, window)
 
-    def _started(self, population: int) -> CMA:
+    def _started(self, population: int) -> "CMA":
         """A new search of that population at a random mean, without a history."""
+        # with scipy behind it: for those who use it
+        from cmaes import CMA
+
         # fitness of the best and of the median individual of each of its generations
         self._history: list[tuple[float, float]] = []
         space = self._space

@@ -21,10 +21,9 @@ from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
 from epuck_mj.errors import UserError
 from epuck_mj.host.yaml_and_json import parse_yaml, to_yaml
 from epuck_mj.policies.network import Network
-from epuck_mj.scene.mjcf import absolute
-from epuck_mj.scene.starts import START_CLEARANCE
+from epuck_mj.scene.model_files import absolute
 from epuck_mj.step.calibration import Calibration
-from epuck_mj.step.control import STEPS_MAX, TaskParameters
+from epuck_mj.step.control import START_CLEARANCE, STEPS_MAX, TaskParameters
 from epuck_mj.step.motors import Speeds
 from evolution.search.table import ALGORITHMS, OptimizerParameters, SearchSpace
 from evolution.settings.setting import Conditions, Setting

@@ -1,0 +1,46 @@
+"""The MJCF files of robots and arenas: those that are shipped, and a person's own."""
+
+from pathlib import Path
+
+from epuck_mj.host.files import find, is_file
+
+_HERE = Path(__file__).resolve().parent.parent
+
+# beside the package in a checkout, inside it where the wheel is installed
+MODELS = next(
+    folder for folder in (_HERE / "models", _HERE.parent / "models") if folder.is_dir()
+)
+
+SHIPPED_ROBOTS = ("epuck.xml", "epuck_planar.xml")
+
+
+def absolute(name: str) -> str:
+    """The name of a robot or arena; if it is a path, from the root on."""
+    path = Path(name)
+    shipped = {file.stem for file in MODELS.rglob("*.xml")}
+    return name if name in shipped or not is_file(path) else str(path.resolve())
+
+
+def find_robot(name: str) -> Path:
+    """The file of a shipped robot, or the user's own.
+
+    Raises:
+        UserError: if there is none.
+    """
+    return _find(name, "robot", [MODELS / robot for robot in SHIPPED_ROBOTS])
+
+
+def find_arena(name: str) -> Path:
+    """The file of a shipped arena, or the user's own.
+
+    Raises:
+        UserError: if there is none.
+    """
+    arenas = [MODELS / "arena.xml", *sorted(MODELS.glob("arenas/*.xml"))]
+    return _find(name, "arena", arenas)
+
+
+def _find(name: str, kind: str, shipped: list[Path]) -> Path:
+    """The file of a shipped model, or the user's own."""
+    by_name = {path.stem: path for path in shipped}
+    return find(name, kind, by_name, "an MJCF").resolve()
