@@ -20,7 +20,7 @@ import tyro
 
 from epuck_mj.policies.file import load
 from epuck_mj.policies.wall_follower import WallFollower
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import (
@@ -123,7 +123,7 @@ def mean_fitness(
     scene: Scene, policies: Mapping[str, BatchPolicy], starts: np.ndarray
 ) -> dict[str, float]:
     """Each controller's mean over the starts."""
-    robots = SimulatedRobots(scene, len(starts))
+    robots = robots_in(scene, len(starts))
     return {
         name: float(run_trials(robots, policy, starts, TASK).fitness.mean())
         for name, policy in policies.items()
@@ -191,7 +191,7 @@ def _measured(
 ) -> tuple[dict[str, float], float]:
     """Mean fitness, and CPU seconds for a control step of a robot that lives."""
     fitness = mean_fitness(scene, policies, starts)
-    robots, task = SimulatedRobots(scene, len(starts), 1), replace(TASK, steps=30)
+    robots, task = robots_in(scene, len(starts), 1), replace(TASK, steps=30)
     costs = []
     for _ in range(3):
         before = time.process_time()

@@ -2,7 +2,7 @@
 
 It drives at real time, trial after trial on new starts, until the window is closed. A
 crash ends a trial. What the window shows is the trial itself, step by step: the same
-start gives the trajectory of `epuck_mj.trials.trajectory.record`, to the last bit.
+start gives the trajectory of `epuck_mj.trials.recorder.record`, to the last bit.
 """
 
 import importlib
@@ -11,7 +11,7 @@ import re
 import threading
 import time
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,12 +23,18 @@ import tyro
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse
+from epuck_mj.host.files import is_file
+from epuck_mj.host.yaml_and_json import read_yaml
 from epuck_mj.policies.file import load
 from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.rungs.disturbed import disturbed
 from epuck_mj.rungs.single import WatchedRobot
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.conditions import Conditions, NoiseLevel
 from epuck_mj.step.control import START_CLEARANCE, Policy, TaskParameters, drive
+from epuck_mj.step.disturbances import Disturbances
 
 LATE_MAX = 0.2
 """How late the picture may be before time that was lost is given up [s]."""
@@ -52,7 +58,14 @@ class Options:
     seconds: float | None = None
     """duration of a trial [s]; the controller's own by default"""
     seed: int = 0
-    """of the random starts"""
+    """seed of the random starts and of noise"""
+    noise: NoiseLevel | None = None
+    """none for ideal sensors and motors, calibrated or strong for real ones; as the
+    champion evolved, if its config.yaml is beside it, by default"""
+    randomise: bool = False
+    """another robot in each trial; needs noise"""
+    calibration: Path | None = None
+    """file of python -m epuck_mj.calibrate: that robot in all trials; needs noise"""
 
 
 class Clock:
@@ -79,6 +92,7 @@ def watch(
     policy: Policy,
     starts: Iterator[np.ndarray],
     task: TaskParameters,
+    meet: Callable[[], Disturbances | None] = lambda: None,
 ) -> Iterator[str]:
     """Trials in a window until it is closed or no start is left; a line for each.
 
@@ -88,6 +102,7 @@ def watch(
         policy: called with observations `(1, 8)`, gives actions `(1, 2)`.
         starts: poses `(3,)`: x, y [m], yaw [rad].
         task: what a trial is.
+        meet: draws what the next trial meets; None for an ideal robot.
     """
     clock, step = Clock(), robot.scene.model.opt.timestep
 
@@ -98,7 +113,8 @@ def watch(
     robot.moved = show
     for number, start in enumerate(starts, 1):
         fitness, crashed, n_steps = 0.0, False, 0
-        for done in drive(robot, policy, robot.reset(start), task):
+        living = disturbed(robot, meet(), task.control_step)
+        for done in drive(living, policy, living.reset(start[None]), task):
             fitness += float(done.fitness[0])
             crashed, n_steps = bool(done.reading.contact[0]), n_steps + 1
             if not window.is_running():
@@ -156,9 +172,11 @@ def run(argv: Sequence[str]) -> int:
     options = parse(Options, "python -m epuck_mj.view", argv)
     policy: Policy = WallFollower()
     task = TaskParameters()
+    conditions = Conditions.asked(options.noise, options.randomise, options.calibration)
     if options.champion is not None:
         file = load(options.champion)
         policy, task = file.controller, file.task
+        conditions = conditions or _evolved_with(options.champion)
     if options.seconds is not None:
         ratio = options.seconds / task.control_step
         if not 0.5 <= ratio < float("inf"):
@@ -171,15 +189,39 @@ def run(argv: Sequence[str]) -> int:
     starts = _starts(scene, options)
     robot, first = WatchedRobot(scene), next(starts)
     # the window shows it before the first trial begins
-    robot.reset(first)
+    robot.reset(first[None])
     starts = itertools.chain([first], starts)
-    with open_window(scene.model, robot.data) as window:
+    noise = np.random.default_rng([options.seed, 1])
+
+    def meet() -> Disturbances | None:
+        return None if conditions is None else conditions.draw(noise, 1, task.steps)
+
+    if conditions is not None and meet() is not None:
+        print(f"driving with {conditions}", flush=True)
+    with open_window(robot.model, robot.data) as window:
         with window.lock():
             # rays go on for ever; controllers see four centimetres of them
             window.opt.flags[mujoco.mjtVisFlag.mjVIS_RANGEFINDER] = False
-        for line in watch(window, robot, policy, starts, task):
+        for line in watch(window, robot, policy, starts, task, meet):
             print(line, flush=True)
     return 0
+
+
+def _evolved_with(champion: Path) -> Conditions | None:
+    """What a champion's robots were like, as the config of its run beside it says."""
+    config = champion.with_name("config.yaml")
+    if not is_file(config):
+        return None
+    fields = read_yaml(config)
+    calibration = fields.get("calibration")
+    try:
+        return Conditions(
+            fields.get("noise", "none"),
+            fields.get("randomise", False),
+            None if calibration is None else Calibration.from_dict(calibration),
+        )
+    except (KeyError, ValueError) as error:
+        raise UserError(f"'{config}' is no config of a run: {error}") from None
 
 
 def _starts(scene: Scene, options: Options) -> Iterator[np.ndarray]:

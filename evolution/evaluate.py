@@ -12,14 +12,13 @@ from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import check_threads, main, parse
 from epuck_mj.policies.wall_follower import YARDSTICK
-from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.conditions import Conditions, NoiseLevel
 from epuck_mj.step.disturbances import Disturbances
 from evolution.judging.held_out import HeldOut, judging, tested_on
 from evolution.judging.starts import N_TEST, held_out_disturbances
 from evolution.named_policies import named_policies
-from evolution.settings.config import NoiseLevel
 from evolution.settings.randomness import Purpose
-from evolution.settings.setting import Conditions, Setting
+from evolution.settings.setting import Setting
 
 MODULE = "evolution.evaluate"
 STARTS_MAX = 100_000
@@ -51,7 +50,7 @@ class Options:
     starts: int = N_TEST
     robot: str | None = None
     arena: str | None = None
-    noise: NoiseLevel = "none"
+    noise: NoiseLevel | None = None
     randomise: bool = False
     calibration: Path | None = None
     threads: int = 0
@@ -77,7 +76,8 @@ def evaluate(argv: Sequence[str]) -> int:
         for path in options.paths
         for found in named_policies(path, options.generations)
     ]
-    conditions = _conditions(options)
+    asked = (options.noise, options.randomise, options.calibration)
+    conditions = Conditions.asked(*asked) or Conditions()
     if options.json is not None:
         files.check_writable(options.json)
     judge = judging(options.threads)
@@ -108,20 +108,6 @@ def evaluate(argv: Sequence[str]) -> int:
         with files.writing():
             files.write_text(options.json, json.dumps(tests, indent=1) + "\n")
     return 0
-
-
-def _conditions(options: Options) -> Conditions:
-    """What the robots are like.
-
-    Raises:
-        UserError: if that excludes itself.
-    """
-    path = options.calibration
-    calibration = None if path is None else Calibration.load(path)
-    try:
-        return Conditions(options.noise, options.randomise, calibration)
-    except ValueError as error:
-        raise UserError(str(error)) from None
 
 
 def _described(test: HeldOut, steps: int) -> str:

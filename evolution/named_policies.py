@@ -15,6 +15,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.policies import file as controller_file
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
+from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import START_CLEARANCE, Policy, TaskParameters
 from evolution.run.directory import RunDirectory
 from evolution.settings.config import ExperimentConfig
@@ -52,6 +53,11 @@ class NamedPolicy:
     variant: str = ""
 
     @property
+    def conditions(self) -> Conditions:
+        """What the robots were like that it evolved on, ideal if nobody knows."""
+        return self.config.conditions if self.config else Conditions()
+
+    @property
     def name(self) -> str:
         """What it is called beside others."""
         return f"{self.source} {self.variant}".rstrip()
@@ -74,7 +80,9 @@ def named_policies(path: str, generations: str | None = None) -> list[NamedPolic
         return [NamedPolicy(YARDSTICK, WallFollower(), TaskParameters())]
     place = Path(path)
     if files.is_file(place):
-        return [_champion(place, path, None)]
+        run = RunDirectory(place.parent)
+        beside = place == run.champion and files.is_file(run.config)
+        return [_champion(place, path, run.stored_config() if beside else None)]
     runs = [RunDirectory(champion.parent) for champion in champions(place)]
     if not runs:
         raise UserError(

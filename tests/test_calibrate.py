@@ -43,7 +43,7 @@ from epuck_mj.constants import (
 from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import SIGNALS
 from epuck_mj.rungs.disturbed import DisturbedRobots
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.step.calibration import Calibration
@@ -653,8 +653,8 @@ def test_a_calibrated_robot_in_simulation(tmp_path, planar):
     quiet = Noise(counts=0.0, wheels=0.0, age=0.0)
     rng = np.random.default_rng(0)
     disturbances = calibrated(calibration, rng, 2, 20, quiet)
-    robots = DisturbedRobots(SimulatedRobots(planar, 2, 1), disturbances, 0.1)
-    other = SimulatedRobots(changed_robot(tmp_path, RADII, 0.0562), 2, 1)
+    robots = DisturbedRobots(MujocoRobots(planar, 2, 1), disturbances, 0.1)
+    other = MujocoRobots(changed_robot(tmp_path, RADII, 0.0562), 2, 1)
     starts = np.array([[0.3, 0.0, 1.0], [0.44, 0.1, 1.5]])
     reading, truth = robots.reset(starts), other.reset(starts)
     command = np.tile(np.array([200, 250]) * STEP_ANGLE, (2, 1))

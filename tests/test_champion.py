@@ -11,7 +11,7 @@ import pytest
 from epuck_mj.host import files
 from epuck_mj.policies import file as controller_file
 from epuck_mj.policies.file import Origin
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.step.control import control_step
 from epuck_mj.step.sensors import observe
 from evolution.judging import starts as starts_module
@@ -61,7 +61,7 @@ def slow_trial(experiment: Experiment, genome, start) -> tuple[float, bool]:
     """Fitness of a genome's trial on one start, alone, and whether it crashed."""
     task = experiment.config.task
     policy = experiment.config.network.decode(genome)
-    robots = SimulatedRobots(experiment.scene, 1, 1)
+    robots = MujocoRobots(experiment.scene, 1, 1)
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     fitness = 0.0
     for _ in range(task.steps):

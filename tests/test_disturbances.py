@@ -10,7 +10,7 @@ from epuck_mj.constants import STEP_RATE_MAX, TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.policies.network import Network
 from epuck_mj.rungs.disturbed import DisturbedRobots
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.robot_parts import ROBOT_BODY
 from epuck_mj.step.calibration import Calibration
@@ -54,7 +54,7 @@ def genomes(n, seed=1):
 
 
 def robots_on(scene, starts, disturbances) -> DisturbedRobots:
-    robots = SimulatedRobots(scene, len(starts), 1)
+    robots = MujocoRobots(scene, len(starts), 1)
     return DisturbedRobots(robots, disturbances, TASK.control_step)
 
 
@@ -109,7 +109,7 @@ def test_arrays_that_do_not_belong_together_are_refused():
 
 def test_without_disturbances_a_robot_counts_and_steps_and_that_is_all(scene):
     quiet = drawn(len(STARTS), QUIET, BOOK)
-    robots, ideal = robots_on(scene, STARTS, quiet), SimulatedRobots(scene, 3, 1)
+    robots, ideal = robots_on(scene, STARTS, quiet), MujocoRobots(scene, 3, 1)
     seen, true = robots.reset(STARTS), ideal.reset(STARTS)
     np.testing.assert_array_equal(seen.truth, true.distance)
     assert seen.proximity is not None
@@ -173,7 +173,7 @@ def test_readings_have_an_age(scene):
 
 def test_bodies_are_heavier_and_slide():
     scene = load_scene("epuck", "arena", TASK.control_step)
-    robots = SimulatedRobots(scene, 2, 1)
+    robots = MujocoRobots(scene, 2, 1)
     robots.embody(np.array([1.0, 2.0]), np.array([1.0, 0.5]))
     model = scene.model
     body, wheel = model.body(ROBOT_BODY).id, model.geom("wheel_left").id

@@ -6,7 +6,7 @@ import pytest
 from epuck_mj.policies.network import Network
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters
-from epuck_mj.trials.trajectory import record
+from epuck_mj.trials.recorder import record
 from evolution.judging import evaluation
 from evolution.judging.evaluation import BatchEngine, DmControlEngine, evaluate
 

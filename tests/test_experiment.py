@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from epuck_mj.errors import UserError
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.step.control import TaskParameters, control_step
 from epuck_mj.step.sensors import observe
 from evolution.judging.starts import starts_for_test, starts_for_validation
@@ -126,7 +126,7 @@ def test_streams_depend_on_each_part_of_their_key():
 
 def slow_trial(scene, policy, start, task: TaskParameters) -> tuple[float, int, bool]:
     """Fitness of one robot's trial, the steps it lived and whether it crashed."""
-    robots = SimulatedRobots(scene, 1, 1)
+    robots = MujocoRobots(scene, 1, 1)
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     fitness = 0.0
     for i in range(task.steps):

@@ -18,7 +18,7 @@ from epuck_mj.show.figures import (
 )
 from epuck_mj.show.pictures import save_figure
 from epuck_mj.step.control import TaskParameters
-from epuck_mj.trials.trajectory import record
+from epuck_mj.trials.recorder import record
 
 TASK = TaskParameters(steps=40)
 EVALUATIONS = np.arange(1, 11) * 100

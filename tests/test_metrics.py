@@ -7,7 +7,7 @@ import pytest
 
 from epuck_mj.constants import BODY_RADIUS, SPEED_MAX, TRACK, WHEEL_RADIUS
 from epuck_mj.policies.wall_follower import WallFollower
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.scene.clearance import CLEARANCE_MAX, ClearanceProbe
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace
@@ -23,7 +23,8 @@ from epuck_mj.trials.behaviour_classes import (
     class_shares,
 )
 from epuck_mj.trials.metrics import Behaviour, behaviour
-from epuck_mj.trials.tracks import Tracks, record_tracks
+from epuck_mj.trials.recorder import record_tracks
+from epuck_mj.trials.tracks import Tracks
 
 STEP = 0.01
 """Way of a control step in trials drawn by hand [m]: 0.1 m/s."""
@@ -358,7 +359,7 @@ def test_an_island_is_followed(tmp_path):
 def test_the_wall_follower_by_hand_is_one(scene):
     probe = ClearanceProbe(scene)
     starts = FreeSpace(scene, 0.01).sample(np.random.default_rng(0), 50)
-    robots = SimulatedRobots(scene, len(starts))
+    robots = MujocoRobots(scene, len(starts))
     tracks = record_tracks(robots, WallFollower(), starts, TASK)
     loops = wall_loops(scene, probe)
     found = behaviour(tracks, probe.measure(tracks.pose), loops, TASK)

@@ -18,7 +18,8 @@ from epuck_mj.trials.phases import (
     SEARCHING,
     phases,
 )
-from epuck_mj.trials.trajectory import Trajectory, record
+from epuck_mj.trials.recorder import record
+from epuck_mj.trials.trajectory import Trajectory
 
 CONTROL_STEP = 0.1
 HALF = round(CORNERING_TIME / CONTROL_STEP / 2)

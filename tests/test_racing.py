@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from epuck_mj.policies.network import Network
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters, Trials, run_trials
 from epuck_mj.step.fitness import STEP_FITNESS, STEP_FITNESS_MAX
-from epuck_mj.trials.trajectory import record
+from epuck_mj.trials.recorder import record
 from evolution.judging import evaluation
 from evolution.judging import starts as starts_module
 from evolution.judging.evaluation import ROUNDING, BatchEngine, Race, evaluate
@@ -95,14 +95,14 @@ class Schedule:
 
 def outcome(after: dict[int, int]) -> tuple[Trials, list[np.ndarray]]:
     lost = Schedule(after)
-    robots = SimulatedRobots(SCENE, N, 1)
+    robots = MujocoRobots(SCENE, N, 1)
     return run_trials(robots, controllers(N), starts(N), TASK, lost), lost.most
 
 
 @pytest.fixture(scope="module")
 def lived():
     """Trials that all live, and each of them alone, step by step."""
-    robots = SimulatedRobots(SCENE, N, 1)
+    robots = MujocoRobots(SCENE, N, 1)
     trials = run_trials(robots, controllers(N), starts(N), TASK)
     alone = [
         record(SCENE, controllers(N)[i : i + 1], starts(N)[i], TASK) for i in range(N)

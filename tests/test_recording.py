@@ -23,7 +23,7 @@ from epuck_mj.show.recording import Trial, save_recording
 from epuck_mj.show.recording.entities import entities
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.trials.phases import PHASES, phases
-from epuck_mj.trials.trajectory import record
+from epuck_mj.trials.recorder import record
 
 TASK = TaskParameters(steps=40)
 START, BESIDE_A_WALL = np.array([[0.4, 0.1, 0.4], [0.35, -0.2, 0.2]])
@@ -369,7 +369,7 @@ import numpy as np
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.scene.model import load_scene
 from epuck_mj.show.recording import Trial, save_recording
-from epuck_mj.trials.trajectory import record
+from epuck_mj.trials.recorder import record
 from epuck_mj.policies.wall_follower import WallFollower
 
 scene, task = load_scene("epuck", "arena"), TaskParameters(steps=5)

@@ -13,7 +13,7 @@ from epuck_mj.show import render
 from epuck_mj.show.colors import HIGH_FITNESS, LOW_FITNESS, TRIALS
 from epuck_mj.show.render import painter
 from epuck_mj.step.control import TaskParameters
-from epuck_mj.trials.trajectory import record
+from epuck_mj.trials.recorder import record
 
 TASK = TaskParameters(steps=40)
 SIZE = (300, 200)

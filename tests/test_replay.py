@@ -15,7 +15,8 @@ from epuck_mj.policies.network import Network
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters
-from epuck_mj.trials.trajectory import Trajectory, record
+from epuck_mj.trials.recorder import record
+from epuck_mj.trials.trajectory import Trajectory
 from evolution.judging.starts import starts_for_test, starts_for_validation
 from evolution.replay import __main__ as command
 from evolution.replay import viewer

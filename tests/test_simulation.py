@@ -8,10 +8,10 @@ import pytest
 from epuck_mj.environments.dm_control import FollowWalls, environment
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters, run_trials
-from epuck_mj.trials.trajectory import record
+from epuck_mj.trials.recorder import record
 
 TASK = TaskParameters(steps=80)
 N = 24
@@ -35,7 +35,7 @@ def test_trajectories_equal_dm_control_s_to_the_last_bit(scene, starts, controll
     crashes = 0
     for fitness in ("product", "literal"):
         task = TaskParameters(steps=80, fitness=fitness)
-        trials = run_trials(SimulatedRobots(scene, N, 2), controllers, starts, task)
+        trials = run_trials(MujocoRobots(scene, N, 2), controllers, starts, task)
         env = environment(scene, FollowWalls(scene, task, starts=starts))
         for i in range(N):
             batch = record(scene, controllers[i : i + 1], starts[i], task)
@@ -62,15 +62,15 @@ def test_trajectories_equal_dm_control_s_to_the_last_bit(scene, starts, controll
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_threads_change_nothing(scene, starts, controllers, threads):
-    one = run_trials(SimulatedRobots(scene, N, 1), controllers, starts, TASK)
-    many = run_trials(SimulatedRobots(scene, N, threads), controllers, starts, TASK)
+    one = run_trials(MujocoRobots(scene, N, 1), controllers, starts, TASK)
+    many = run_trials(MujocoRobots(scene, N, threads), controllers, starts, TASK)
     np.testing.assert_array_equal(one.fitness, many.fitness)
     np.testing.assert_array_equal(one.steps, many.steps)
 
 
 def test_company_changes_nothing(scene, starts, controllers):
     """Alone, in any subset, in any order, in robots used before."""
-    robots = SimulatedRobots(scene, N + 3, 1)
+    robots = MujocoRobots(scene, N + 3, 1)
     everybody = run_trials(robots, controllers, starts, TASK)
     rng = np.random.default_rng(2)
     for size in (1, 2, 7, N):
@@ -83,7 +83,7 @@ def test_company_changes_nothing(scene, starts, controllers):
 
 def test_crashed_robots_are_not_stepped_again(scene):
     """Their time stands still while the others' goes on."""
-    robots = SimulatedRobots(scene, 2, 1)
+    robots = MujocoRobots(scene, 2, 1)
     robots.reset(np.array([[0.45, 0, 0], [0, 0, 0]]))
     for _ in range(5):
         reading = robots.step(np.full((len(robots.poses()), 2), 6.0))
@@ -99,7 +99,7 @@ def test_a_crash_ends_the_sum(scene):
     ahead[32:36] = 5
     start = np.array([[0.38, 0.0, 0.0]])
     controller = Network().decode(ahead[None])
-    trials = run_trials(SimulatedRobots(scene, 1, 1), controller, start, TASK)
+    trials = run_trials(MujocoRobots(scene, 1, 1), controller, start, TASK)
     assert trials.crashed[0]
     trajectory = record(scene, controller, start[0], TASK)
     assert trajectory.fitness[-1] == 0
@@ -109,13 +109,13 @@ def test_a_crash_ends_the_sum(scene):
 
 def test_too_many_starts_are_refused(scene):
     with pytest.raises(ValueError, match="at most 2 starts, got 3"):
-        SimulatedRobots(scene, 2).reset(np.zeros((3, 3)))
+        MujocoRobots(scene, 2).reset(np.zeros((3, 3)))
 
 
 def test_the_hand_written_wall_follower_follows_walls(scene):
     """On both robots it lives and earns more than half of what there is to earn."""
     starts = FreeSpace(scene, 0.01).sample(np.random.default_rng(3), 100)
-    robots = SimulatedRobots(scene, 100)
+    robots = MujocoRobots(scene, 100)
     trials = run_trials(robots, WallFollower(), starts, TaskParameters())
     assert trials.fitness.mean() > 180
     assert trials.crashed.mean() < 0.05
@@ -125,7 +125,7 @@ def test_the_hand_written_wall_follower_follows_walls(scene):
 def test_memory_stays_flat_over_10000_trials(scene):
     starts = FreeSpace(scene, 0.01).sample(np.random.default_rng(4), 500)
     genomes = np.random.default_rng(5).uniform(-5, 5, (500, 40))
-    robots = SimulatedRobots(scene, 500)
+    robots = MujocoRobots(scene, 500)
     task, peak = TaskParameters(steps=10), []
     for _ in range(22):
         run_trials(robots, Network().decode(genomes), starts, task)

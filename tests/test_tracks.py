@@ -7,11 +7,13 @@ import pytest
 
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.disturbed import disturbed
+from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import TaskParameters, run_trials
-from epuck_mj.trials.tracks import record_tracks
-from epuck_mj.trials.trajectory import record
+from epuck_mj.step.sensors import proximity
+from epuck_mj.trials.recorder import record, record_tracks, record_trajectories
 
 TASK = TaskParameters(steps=80)
 N = 12
@@ -35,8 +37,8 @@ def controllers():
 def test_outcomes_are_those_of_run_trials_to_the_last_bit(
     scene, starts, controllers, capacity
 ):
-    trials = run_trials(SimulatedRobots(scene, N, 1), controllers, starts, TASK)
-    robots = SimulatedRobots(scene, capacity, 2)
+    trials = run_trials(MujocoRobots(scene, N, 1), controllers, starts, TASK)
+    robots = MujocoRobots(scene, capacity, 2)
     tracks = record_tracks(robots, controllers, starts, TASK)
     assert 0 < trials.crashed.sum() < N
     np.testing.assert_array_equal(tracks.trial_fitness, trials.fitness)
@@ -45,7 +47,7 @@ def test_outcomes_are_those_of_run_trials_to_the_last_bit(
 
 
 def test_each_is_the_trajectory_of_its_trial(scene, starts, controllers):
-    robots = SimulatedRobots(scene, N, 2)
+    robots = MujocoRobots(scene, N, 2)
     tracks = record_tracks(robots, controllers, starts, TASK)
     for i in range(N):
         trajectory = record(scene, controllers[i], starts[i], TASK)
@@ -60,21 +62,54 @@ def test_each_is_the_trajectory_of_its_trial(scene, starts, controllers):
         assert np.isnan(tracks.fitness[i, steps:]).all()
 
 
+def test_with_disturbances_they_are_still_the_trials_of_run_trials(
+    scene, starts, controllers
+):
+    conditions = Conditions("strong", randomise=True)
+    met = conditions.draw(np.random.default_rng(5), N, TASK.steps)
+    assert met is not None
+    robots = disturbed(MujocoRobots(scene, N, 1), met, TASK.control_step)
+    trials = run_trials(robots, controllers, starts, TASK)
+    ideal = record_tracks(MujocoRobots(scene, N, 1), controllers, starts, TASK)
+    # fewer robots than trials: each part meets its own disturbances
+    tracks = record_tracks(MujocoRobots(scene, 5, 1), controllers, starts, TASK, met)
+    np.testing.assert_array_equal(tracks.trial_fitness, trials.fitness)
+    np.testing.assert_array_equal(tracks.crashed, trials.crashed)
+    assert (tracks.trial_fitness != ideal.trial_fitness).any()
+    for i in range(N):
+        own = met[i : i + 1]
+        trajectory = record(scene, controllers[i], starts[i], TASK, own)
+        assert trajectory.trial_fitness == trials.fitness[i]
+        assert trajectory.crashed == trials.crashed[i]
+        # what was counted with noise, and where the walls really were
+        assert (trajectory.proximity != np.rint(proximity(trajectory.distance))).any()
+
+
+def test_many_trajectories_are_those_recorded_one_by_one(scene, starts):
+    together = record_trajectories(scene, WallFollower(), starts, TASK)
+    for start, trajectory in zip(starts, together, strict=True):
+        alone = record(scene, WallFollower(), start, TASK)
+        for field in dataclasses.fields(alone):
+            np.testing.assert_array_equal(
+                getattr(trajectory, field.name), getattr(alone, field.name)
+            )
+
+
 def test_a_policy_without_members_serves_any_number(scene, starts):
-    robots = SimulatedRobots(scene, 5, 1)
+    robots = MujocoRobots(scene, 5, 1)
     tracks = record_tracks(robots, WallFollower(), starts, TASK)
-    trials = run_trials(SimulatedRobots(scene, N, 1), WallFollower(), starts, TASK)
+    trials = run_trials(MujocoRobots(scene, N, 1), WallFollower(), starts, TASK)
     np.testing.assert_array_equal(tracks.trial_fitness, trials.fitness)
 
 
 def test_no_starts_make_no_tracks(scene):
-    robots = SimulatedRobots(scene, 1, 1)
+    robots = MujocoRobots(scene, 1, 1)
     tracks = record_tracks(robots, WallFollower(), np.zeros((0, 3)), TASK)
     assert tracks.trial_fitness.shape == (0,)
 
 
 def test_arrays_that_do_not_belong_together_are_refused(scene, starts):
-    robots = SimulatedRobots(scene, N, 1)
+    robots = MujocoRobots(scene, N, 1)
     tracks = record_tracks(robots, WallFollower(), starts, TaskParameters(steps=3))
     with pytest.raises(ValueError, match="expected pose of shape"):
         dataclasses.replace(tracks, pose=tracks.pose[:, 1:])

@@ -10,12 +10,13 @@ import pytest
 from epuck_mj.errors import UserError
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.scene.model import load_scene
 from epuck_mj.step.control import TaskParameters, run_trials
 from epuck_mj.step.motors import command
 from epuck_mj.step.sensors import observe, proximity
-from epuck_mj.trials.trajectory import Trajectory, record
+from epuck_mj.trials.recorder import record
+from epuck_mj.trials.trajectory import Trajectory
 
 TASK = TaskParameters(steps=60)
 STARTS = np.array([[0.0, 0.0, 0.0], [0.42, 0.1, 0.4], [-0.2, -0.44, 3.0]])
@@ -46,7 +47,7 @@ def equal(a, b):
 def test_fitness_is_that_of_run_trials_to_the_last_bit(scene, seed):
     genomes = np.stack([genome(seed)] * len(STARTS))
     controllers = Network().decode(genomes)
-    robots = SimulatedRobots(scene, len(STARTS), 1)
+    robots = MujocoRobots(scene, len(STARTS), 1)
     trials = run_trials(robots, controllers, STARTS, TASK)
     for i, start in enumerate(STARTS):
         trajectory = record(scene, controllers[i], start, TASK)

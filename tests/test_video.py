@@ -12,7 +12,7 @@ import pytest
 from epuck_mj.errors import UserError
 from epuck_mj.scene.model import load_scene
 from epuck_mj.step.control import TaskParameters
-from epuck_mj.trials.trajectory import record
+from epuck_mj.trials.recorder import record
 
 TASK = TaskParameters(steps=20)
 SIZE = (160, 112)

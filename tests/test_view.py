@@ -15,11 +15,13 @@ from epuck_mj.errors import UserError
 from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.rungs.disturbed import disturbed
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import TaskParameters, drive
-from epuck_mj.trials.trajectory import record
+from epuck_mj.trials.recorder import record
 
 TASK = TaskParameters(steps=120)
 
@@ -42,20 +44,27 @@ def champion(tmp_path):
 
 @pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
 @pytest.mark.parametrize("policy", [WallFollower(), straight_on])
-def test_a_trial_is_the_one_that_record_gives(robot, policy):
+@pytest.mark.parametrize("noise", ["none", "strong"])
+def test_a_trial_is_the_one_that_record_gives(robot, policy, noise):
     scene = load_scene(robot, "pillars")
     watched = view.WatchedRobot(scene)
     # one robot for all trials: a reset leaves nothing of the one before
-    for start in FreeSpace(scene, 0.01).sample(np.random.default_rng(0), 4):
-        recorded = record(scene, policy, start, TASK)
-        steps = list(drive(watched, policy, watched.reset(start), TASK))
+    starts = FreeSpace(scene, 0.01).sample(np.random.default_rng(0), 4)
+    conditions = Conditions(noise, randomise=noise != "none")
+    met = conditions.draw(np.random.default_rng(1), len(starts), TASK.steps)
+    for i, start in enumerate(starts):
+        own = None if met is None else met[i : i + 1]
+        recorded = record(scene, policy, start, TASK, own)
+        living = disturbed(watched, own, TASK.control_step)
+        steps = list(drive(living, policy, living.reset(start[None]), TASK))
         for name in ("action", "command", "fitness"):
             done = np.concatenate([getattr(step, name) for step in steps])
             np.testing.assert_array_equal(done, getattr(recorded, name))
         seen = np.concatenate([step.observation for step in steps])
         np.testing.assert_array_equal(seen, recorded.observation[1:])
-        distance = np.concatenate([step.reading.distance for step in steps])
-        np.testing.assert_array_equal(distance, recorded.distance[1:])
+        if own is None:
+            distance = np.concatenate([step.reading.distance for step in steps])
+            np.testing.assert_array_equal(distance, recorded.distance[1:])
         pose = scene.poses(watched.data.qpos)
         np.testing.assert_array_equal(pose, recorded.pose[-1])
         assert steps[-1].reading.contact[0] == recorded.crashed
@@ -249,6 +258,6 @@ def test_without_glfw_one_line_says_so(monkeypatch):
     robot = view.WatchedRobot(scene)
     with (
         pytest.raises(UserError, match="cannot open a window"),
-        view.open_window(scene.model, robot.data),
+        view.open_window(robot.model, robot.data),
     ):
         pass

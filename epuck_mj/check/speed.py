@@ -8,7 +8,7 @@ import numpy as np
 
 from epuck_mj.check.findings import Finding, Place, info, warning
 from epuck_mj.policies.wall_follower import WallFollower
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.robot_parts import TIMESTEP
 from epuck_mj.step.control import ControlStep, TaskParameters, drive
@@ -68,7 +68,7 @@ def _has_step(model: mujoco.MjModel) -> bool:
 
 def _standing(scene: Scene, start: np.ndarray) -> Iterator[None]:
     """Control steps of a robot that is told to stand still, for ever."""
-    robots = SimulatedRobots(scene, 1, 1)
+    robots = robots_in(scene, 1, 1)
     robots.reset(start[None])
     while True:
         robots.step(np.zeros((1, 2)))
@@ -79,7 +79,7 @@ def _driving(
     scene: Scene, start: np.ndarray, task: TaskParameters
 ) -> Iterator[ControlStep]:
     """Control steps of a robot with a controller, for ever."""
-    robots, policy = SimulatedRobots(scene, 1, 1), WallFollower()
+    robots, policy = robots_in(scene, 1, 1), WallFollower()
     while True:
         yield from drive(robots, policy, robots.reset(start[None]), task)
 

@@ -7,15 +7,16 @@ is put back into metres as the bridge does it on a robot.
 
 import numpy as np
 
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.simulator import Simulator
+from epuck_mj.step.control import Robots
 from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.step.motors import actual_rates, step_rates, wheel_speeds
 from epuck_mj.step.sensors import Reading, counted, sensed_distance
 
 
 def disturbed(
-    robots: SimulatedRobots, disturbances: Disturbances | None, control_step: float
-) -> "SimulatedRobots | DisturbedRobots":
+    robots: Simulator, disturbances: Disturbances | None, control_step: float
+) -> Robots:
     """Robots with disturbances around them, or as they are if there are none.
 
     Args:
@@ -31,11 +32,11 @@ def disturbed(
 
 
 class DisturbedRobots:
-    """Robots in disturbances; steps like `SimulatedRobots`."""
+    """Robots in disturbances; stepped like those inside."""
 
     def __init__(
         self,
-        robots: SimulatedRobots,
+        robots: Simulator,
         disturbances: Disturbances,
         control_step: float,
     ):
@@ -51,7 +52,7 @@ class DisturbedRobots:
         self._share = disturbances.age / control_step
 
     def reset(self, starts: np.ndarray) -> Reading:
-        """See `SimulatedRobots.reset`.
+        """See `Robots.reset`.
 
         Raises:
             ValueError: if there are not as many starts as disturbances.
@@ -68,7 +69,7 @@ class DisturbedRobots:
         return self._sensed(reading)
 
     def step(self, command: np.ndarray) -> Reading:
-        """See `SimulatedRobots.step`."""
+        """See `Robot.step`."""
         given, of = self._disturbances, self._of
         self._sent = np.roll(self._sent, 1, axis=1)
         self._sent[:, 0] = command
@@ -82,13 +83,13 @@ class DisturbedRobots:
         return self._sensed(self._robots.step(wheels))
 
     def keep(self, mask: np.ndarray) -> None:
-        """See `SimulatedRobots.keep`."""
+        """See `Robots.keep`."""
         self._robots.keep(mask)
         self._of, self._sent = self._of[mask], self._sent[mask]
         self._before = self._before[mask]
 
     def poses(self) -> np.ndarray:
-        """See `SimulatedRobots.poses`."""
+        """See `Robots.poses`."""
         return self._robots.poses()
 
     def _sensed(self, reading: Reading) -> Reading:

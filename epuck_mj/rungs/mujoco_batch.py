@@ -9,15 +9,12 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from epuck_mj.rungs.bodies import body_fields, wheel_limits
 from epuck_mj.scene.model import Scene
-from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL
 from epuck_mj.step.sensors import Reading
 
-SPARE_SPEED = 2.0
-"""Of wheels of robots with bodies of their own, against the actuators' limits."""
 
-
-class SimulatedRobots:
+class MujocoRobots:
     """Up to `capacity` robots in copies of one scene."""
 
     def __init__(self, scene: Scene, capacity: int, threads: int = 0):
@@ -70,34 +67,20 @@ class SimulatedRobots:
         return self._reading()
 
     def embody(self, mass: np.ndarray, friction: np.ndarray) -> None:
-        """Give the robots bodies of their own, from the next reset on.
-
-        Their wheels may turn faster than a firmware would ask for: larger ones do.
-
-        Args:
-            mass: of each robot against the scene's, `(robots,)`.
-            friction: of all but its shell, likewise.
-        """
-        model, n, wheels = self.scene.model, len(mass), self.scene.wheels
-        limits = self._batch.expand("actuator_ctrlrange")
-        limits[:n, wheels] = model.actuator_ctrlrange[wheels] * SPARE_SPEED
-        if not self._embodied and (mass == 1).all() and (friction == 1).all():
-            return
-        self._embodied = True
-        robot = model.body_rootid == model.body(ROBOT_BODY).id
-        tyres = robot[model.geom_bodyid]
-        tyres[model.geom(SHELL).id] = False
-        for name in ("body_mass", "body_inertia"):
-            field, own = self._batch.expand(name), getattr(model, name)[robot]
-            scale = mass.reshape(n, *[1] * own.ndim)
-            field[:n, robot] = own * scale
-        field = self._batch.expand("geom_friction")
-        field[:n, tyres] = model.geom_friction[tyres] * friction[:, None, None]
-        # what the contact solver has worked out from them
-        self._batch.set_const(np.arange(n, dtype=np.int32))
+        """See `Simulator.embody`."""
+        n, changes = len(mass), wheel_limits(self.scene, len(mass))
+        others = self._embodied or (mass != 1).any() or (friction != 1).any()
+        if others:
+            changes |= body_fields(self.scene, mass, friction)
+        for name, (where, values) in changes.items():
+            self._batch.expand(name)[:n, where] = values
+        if others:
+            self._embodied = True
+            # what the contact solver has worked out from them
+            self._batch.set_const(np.arange(n, dtype=np.int32))
 
     def disembody(self) -> None:
-        """Give the robots the scene's body back, from the next reset on."""
+        """See `Simulator.disembody`."""
         if self._embodied:
             self.embody(np.ones(self.capacity), np.ones(self.capacity))
             self._embodied = False

@@ -1,54 +1,70 @@
 """One robot in MuJoCo that others can look at after every physics step."""
 
+import copy
 from collections.abc import Callable
 
 import mujoco
 import numpy as np
 
+from epuck_mj.rungs.bodies import body_fields, wheel_limits
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.sensors import Reading
 
 
 class WatchedRobot:
-    """One robot in an `MjData` that others can look at after every physics step.
-
-    It starts and moves as `epuck_mj.rungs.mujoco_batch.SimulatedRobots` does.
+    """A `Simulator` of one robot in an `MjData`; it moves as in a batch, to the bit.
 
     Attributes:
         scene: robot and arena.
+        model: the scene's, or that of a robot with a body of its own.
         data: what others can look at.
         moved: called when the robot was reset and after every physics step.
     """
 
+    capacity = 1
+
     def __init__(self, scene: Scene):
         """Allocate the robot."""
         self.scene = scene
-        self.data = mujoco.MjData(scene.model)
+        self.model = copy.copy(scene.model)
+        self.data = mujoco.MjData(self.model)
         self.moved: Callable[[], None] = lambda: None
 
-    def reset(self, start: np.ndarray) -> Reading:
-        """Put the robot at rest on a start `(3,)`: x, y [m], yaw [rad]."""
-        model, data = self.scene.model, self.data
-        mujoco.mj_resetData(model, data)
-        data.qpos[:] = self.scene.qpos(start)
-        mujoco.mj_step1(model, data)
+    def reset(self, starts: np.ndarray) -> Reading:
+        """Put the robot at rest on a start `(1, 3)`: x, y [m], yaw [rad]."""
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:] = self.scene.qpos(starts)[0]
+        mujoco.mj_step1(self.model, self.data)
         self.moved()
         return self._reading()
 
     def step(self, command: np.ndarray) -> Reading:
-        """Drive for one control step.
-
-        Args:
-            command: wheel speeds [rad/s], `(1, 2)`.
-        """
-        model, data = self.scene.model, self.data
-        data.ctrl[self.scene.wheels] = command[0]
+        """Drive for one control step at wheel speeds `(1, 2)` [rad/s]."""
+        self.data.ctrl[self.scene.wheels] = command[0]
         for _ in range(self.scene.n_substeps):
             # the second half first: positions and sensors are always those of now
-            mujoco.mj_step2(model, data)
-            mujoco.mj_step1(model, data)
+            mujoco.mj_step2(self.model, self.data)
+            mujoco.mj_step1(self.model, self.data)
             self.moved()
         return self._reading()
+
+    def keep(self, mask: np.ndarray) -> None:
+        """See `Robots.keep`; one robot stays or there is none left to step."""
+
+    def poses(self) -> np.ndarray:
+        """Where the robot is, `(1, 3)`: x, y [m], yaw [rad]."""
+        return self.scene.poses(self.data.qpos[None])
+
+    def embody(self, mass: np.ndarray, friction: np.ndarray) -> None:
+        """See `Simulator.embody`."""
+        fields = body_fields(self.scene, mass, friction) | wheel_limits(self.scene, 1)
+        for name, (where, values) in fields.items():
+            getattr(self.model, name)[where] = values[0]
+        mujoco.mj_setConst(self.model, self.data)
+
+    def disembody(self) -> None:
+        """See `Simulator.disembody`."""
+        self.embody(np.ones(1), np.ones(1))
 
     def _reading(self) -> Reading:
         return self.scene.reading(self.data.sensordata[None].copy())

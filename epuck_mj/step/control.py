@@ -1,6 +1,6 @@
 """The control step and the trial: the same for one robot and for thousands."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field
 from typing import Any, Protocol, Self
 
@@ -45,6 +45,10 @@ class Robots(Robot, Protocol):
 
     def keep(self, mask: np.ndarray) -> None:
         """Go on with those robots, of the ones still active, that `mask` names."""
+        ...
+
+    def poses(self) -> np.ndarray:
+        """Where the active robots are, `(active, 3)`: x, y [m], yaw [rad]."""
         ...
 
 
@@ -164,10 +168,24 @@ class Trials:
     steps: np.ndarray
     crashed: np.ndarray
 
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """The trials of all parts, in their order."""
+        none = np.zeros(0), np.zeros(0, int), np.zeros(0, bool)
+        columns = zip(none, *(astuple(part) for part in parts), strict=True)
+        return cls(*map(np.concatenate, columns))
 
-Seen = Callable[[int, np.ndarray, ControlStep], None]
-"""Told of a control step: its number, which trials `(active,)` it was one of, and what
-came of it for each of them."""
+
+class Watcher(Protocol):
+    """Told of trials as they are lived."""
+
+    def started(self, reading: Reading, observation: np.ndarray) -> None:
+        """What all robots sense on their starts, and their policies' first input."""
+        ...
+
+    def stepped(self, k: int, active: np.ndarray, step: ControlStep) -> None:
+        """What came of control step `k` for each of the trials `(active,)`."""
+        ...
 
 
 class BatchPolicy(Protocol):
@@ -182,13 +200,29 @@ class BatchPolicy(Protocol):
         ...
 
 
+class Everybody:
+    """A batch policy whose members are all the same."""
+
+    def __init__(self, policy: Policy):
+        """Name the policy of them all."""
+        self._policy = policy
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        """Actions `(robots, 2)` for observations `(robots, 8)`."""
+        return self._policy(observation)
+
+    def __getitem__(self, index: np.ndarray | slice) -> Self:
+        """Itself."""
+        return self
+
+
 def run_trials(
     robots: Robots,
     policy: BatchPolicy,
     starts: np.ndarray,
     task: TaskParameters,
     lost: Lost | None = None,
-    seen: Seen | None = None,
+    watcher: Watcher | None = None,
 ) -> Trials:
     """One trial per start; a robot that crashes is not stepped again.
 
@@ -199,19 +233,22 @@ def run_trials(
         task: what a trial is.
         lost: asked after every step which trials to break off, uncrashed, with what
             they have earned so far; None lets all of them live.
-        seen: told of every step; None if nobody watches.
+        watcher: told of starts and steps; None if nobody watches.
     """
     n_trials = len(starts)
     fitness = np.zeros(n_trials)
     steps = np.zeros(n_trials, int)
     crashed = np.zeros(n_trials, bool)
     active = np.arange(n_trials)
-    observation = observe(robots.reset(starts).distance, task.sensor_range)
+    reading = robots.reset(starts)
+    observation = observe(reading.distance, task.sensor_range)
+    if watcher is not None:
+        watcher.started(reading, observation)
     for k in range(task.steps):
         step = control_step(robots, policy, observation, task)
         observation = step.observation
-        if seen is not None:
-            seen(k, active, step)
+        if watcher is not None:
+            watcher.stepped(k, active, step)
         fitness[active] += step.fitness
         steps[active] += 1
         alive = ~step.reading.contact

@@ -13,10 +13,7 @@ from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import read_arrays, write_arrays, writing
 from epuck_mj.policies.network import Controller
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
-from epuck_mj.scene.model import Scene
-from epuck_mj.step.control import Policy, TaskParameters, drive
-from epuck_mj.step.sensors import observe, proximity
+from epuck_mj.step.control import Policy
 
 FORMAT = "epuck_mj.trajectory/2"
 
@@ -121,40 +118,6 @@ class Trajectory:
             return cls(**arrays)
         except (TypeError, ValueError) as error:
             raise UserError(f"'{path}' is not a trajectory file: {error}") from None
-
-
-def record(
-    scene: Scene, policy: Policy, start: np.ndarray, task: TaskParameters
-) -> Trajectory:
-    """One trial, ended by a crash or after `task.steps`.
-
-    Args:
-        scene: robot and arena.
-        policy: called with observations `(1, 8)`, gives actions `(1, 2)`.
-        start: pose `(3,)`: x, y [m], yaw [rad].
-        task: what a trial is.
-    """
-    robots = SimulatedRobots(scene, 1, 1)
-    first = robots.reset(np.asarray(start, float)[None])
-    poses, steps = [robots.poses()], []
-    for step in drive(robots, policy, first, task):
-        poses.append(robots.poses())
-        steps.append(step)
-    readings = [first, *(step.reading for step in steps)]
-    distance = np.concatenate([reading.distance for reading in readings])
-    seen = observe(distance, task.sensor_range)
-    return Trajectory(
-        time=np.arange(len(poses)) * task.control_step,
-        pose=np.concatenate(poses),
-        distance=distance,
-        proximity=np.rint(proximity(distance)),
-        observation=seen,
-        contact=np.concatenate([reading.contact for reading in readings]),
-        hidden=hidden_outputs(policy, seen[:-1]),
-        action=np.concatenate([step.action for step in steps]),
-        command=np.concatenate([step.command for step in steps]),
-        fitness=np.concatenate([step.fitness for step in steps]),
-    )
 
 
 def hidden_outputs(policy: Policy, observations: np.ndarray) -> np.ndarray:

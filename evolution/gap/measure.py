@@ -4,12 +4,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
-from epuck_mj.trials.tracks import Tracks, record_tracks
+from epuck_mj.step.control import Everybody
+from epuck_mj.trials.recorder import record_tracks
+from epuck_mj.trials.tracks import Tracks
 from evolution.gap.worlds import World, met
-from evolution.judging.held_out import Everybody
 from evolution.judging.starts import starts_for_test
 from evolution.named_policies import NamedPolicy
 
@@ -45,7 +46,7 @@ def ideal(
     outcomes = []
     for policy in policies:
         scene = scenes(arena or policy.arena, policy.task.control_step)
-        robots = SimulatedRobots(scene, n, threads)
+        robots = robots_in(scene, n, threads)
         starts = starts_for_test(free(scene, policy.start_clearance), n)
         everybody = Everybody(policy.policy)
         tracks = record_tracks(robots, everybody, starts, policy.task)
@@ -66,7 +67,7 @@ def abroad(
     """
     for index, world in enumerate(worlds):
         scene, period = _scene(world, robot)
-        robots = SimulatedRobots(scene, n, threads)
+        robots = robots_in(scene, n, threads)
         # the same for most policies, and slow
         free = cache(FreeSpace)
         outcomes = []

@@ -8,16 +8,15 @@ soon as it no longer can, since no control step is worth more than 1. Whoever be
 what it has to has lived all its trials, so no comparison comes out differently.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
-from epuck_mj.environments.dm_control import FollowWalls, environment
 from epuck_mj.policies.network import Controller, Network
 from epuck_mj.rungs.disturbed import disturbed
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.control import TaskParameters, Trials, run_trials
 from epuck_mj.step.disturbances import Disturbances
@@ -136,7 +135,7 @@ class BatchEngine:
     def __init__(self, scene: Scene, task: TaskParameters, threads: int = 0):
         """Allocate the robots; `threads` 0 is one per core."""
         self._task = task
-        self._robots = SimulatedRobots(scene, CAPACITY, threads)
+        self._robots = robots_in(scene, CAPACITY, threads)
 
     def run(self, work: Work) -> Trials:
         """See `Engine.run`."""
@@ -153,7 +152,7 @@ class BatchEngine:
             )
             for part in work.chunks(self._robots.capacity)
         ]
-        return joined(parts)
+        return Trials.joined(parts)
 
 
 class DmControlEngine:
@@ -172,6 +171,9 @@ class DmControlEngine:
         """
         if work.disturbances is not None:
             raise ValueError("expected no disturbances: dm_control has ideal robots")
+        # dm_control for those who use it
+        from epuck_mj.environments.dm_control import FollowWalls, environment
+
         task = FollowWalls(self._scene, self._task, starts=work.starts)
         env, n = environment(self._scene, task), len(work)
         fitness, steps = np.zeros(n), np.zeros(n, int)
@@ -215,13 +217,4 @@ def evaluate(
         trials.fitness.reshape(shape),
         trials.steps.reshape(shape),
         trials.crashed.reshape(shape),
-    )
-
-
-def joined(parts: Sequence[Trials]) -> Trials:
-    """The trials of all parts, in their order."""
-    return Trials(
-        np.concatenate([part.fitness for part in parts]),
-        np.concatenate([part.steps for part in parts]),
-        np.concatenate([part.crashed for part in parts]),
     )

@@ -6,20 +6,19 @@ The numbers that a study reports.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Self
 
 import numpy as np
 
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.scene.wall_loops import wall_loops
-from epuck_mj.step.control import Policy, TaskParameters
+from epuck_mj.step.control import Everybody, Policy, TaskParameters
 from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.trials.behaviour_classes import class_shares
 from epuck_mj.trials.metrics import behaviour
-from epuck_mj.trials.tracks import record_tracks
+from epuck_mj.trials.recorder import record_tracks
 from evolution.judging.evaluation import CAPACITY
 from evolution.judging.starts import N_TEST, starts_for_test
 from evolution.settings.setting import Setting
@@ -59,22 +58,6 @@ class HeldOut:
     starts: int
     behaviour: Mapping[str, float]
     metrics: Mapping[str, float | None]
-
-
-class Everybody:
-    """A batch policy whose members are all the same."""
-
-    def __init__(self, policy: Policy):
-        """Name the policy of them all."""
-        self._policy = policy
-
-    def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """Actions `(robots, 2)` for observations `(robots, 8)`."""
-        return self._policy(observation)
-
-    def __getitem__(self, index: np.ndarray | slice) -> Self:
-        """Itself."""
-        return self
 
 
 Judging = Callable[[str, Setting], "Judge"]
@@ -152,7 +135,7 @@ class Judge:
             n: number of starts.
             disturbances: of the `n` trials; None for ideal robots.
         """
-        robots = SimulatedRobots(self.scene, min(CAPACITY, n), self._threads)
+        robots = robots_in(self.scene, min(CAPACITY, n), self._threads)
         everybody, starts = Everybody(policy), self.starts(n)
         tracks = record_tracks(robots, everybody, starts, self._task, disturbances)
         clearance = self._probe.measure(tracks.pose)

@@ -6,9 +6,9 @@ Both sets are fixed, the same for all runs, and never used in evolution.
 import numpy as np
 
 from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.disturbances import Disturbances
 from evolution.settings.randomness import Purpose, disturbances, random_generator
-from evolution.settings.setting import Conditions
 
 HELD_OUT_SEED = 0
 """Seed of validation and test starts: no run's seed reaches their streams."""

@@ -17,9 +17,16 @@ from epuck_mj.host.files import writing
 from epuck_mj.scene.geometry import arena_box
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.show.recording import Trial, save_recording
+from epuck_mj.step.conditions import Conditions, NoiseLevel
 from evolution.judging.held_out import WHEELED_ROBOT
 from evolution.named_policies import NamedPolicy, described, named_policies
-from evolution.replay.trials import from_file, labels, numbered_starts, simulated
+from evolution.replay.trials import (
+    Starts,
+    from_file,
+    labels,
+    numbered_starts,
+    simulated,
+)
 from evolution.replay.viewer import display_there, open_viewer
 from evolution.replay.web import LOOPBACK, server, write_page
 
@@ -47,6 +54,11 @@ class Options:
         pose: on which start instead: x [m], y [m] and heading [degrees].
         robot: robot that drives.
         arena: arena to drive in; the one it evolved in if not given.
+        noise: none for ideal sensors and motors, calibrated or strong for real ones; as
+            it evolved if neither this nor the next two are given.
+        randomise: another robot in each trial; needs noise.
+        calibration: file of python -m epuck_mj.calibrate: that robot in all trials;
+            needs noise.
         save: write the recording here (.rrd).
         web: write it as a web page into this folder, and serve that on 127.0.0.1.
         video: write a video here (.mp4); needs EGL or OSMesa.
@@ -61,6 +73,9 @@ class Options:
     pose: tuple[float, ...] = ()
     robot: str = WHEELED_ROBOT
     arena: str | None = None
+    noise: NoiseLevel | None = None
+    randomise: bool = False
+    calibration: Path | None = None
     save: Path | None = None
     web: Path | None = None
     video: Path | None = None
@@ -87,8 +102,10 @@ def replay(argv: Sequence[str]) -> int:
         if not path.endswith(".npz")
         for policy in named_policies(path, options.generations)
     ]
+    conditions = Conditions.asked(options.noise, options.randomise, options.calibration)
     scene = _scene(options, policies)
-    trials = [*simulated(scene, policies, _starts(options, scene, policies)), *recorded]
+    starts = _starts(options, scene, policies)
+    trials = [*simulated(scene, policies, starts, conditions), *recorded]
     for trial in trials:
         print(_outcome(trial))
     title = ", ".join(labels(policies) or [trial.name for trial in recorded])
@@ -113,10 +130,8 @@ def _scene(options: Options, policies: Sequence[NamedPolicy]) -> Scene:
     return load_scene(options.robot, arena, control_steps.pop())
 
 
-def _starts(
-    options: Options, scene: Scene, policies: Sequence[NamedPolicy]
-) -> dict[str, np.ndarray]:
-    """Starts by name, `(3,)` each."""
+def _starts(options: Options, scene: Scene, policies: Sequence[NamedPolicy]) -> Starts:
+    """The starts to drive from."""
     ways = (options.trials, options.starts, options.pose or None)
     if sum(way is not None for way in ways) > 1:
         raise UserError("expected one of --trials, --starts and --pose, got several")
@@ -131,12 +146,12 @@ def _starts(
                 "expected --pose with x [m], y [m] and heading [degrees], got "
                 + " ".join(f"{number:g}" for number in options.pose)
             )
-        return {"pose": _pose(scene, *options.pose)}
+        return Starts.from_pose(_pose(scene, *options.pose))
     trials = 1 if options.trials is None else options.trials
     if trials < 1:
         raise UserError(f"expected at least 1 trial, got {trials}")
     if not policies:
-        return {}
+        return Starts.none()
     # the widest: a start that is free for one is free for all
     clearance = max(policy.start_clearance for policy in policies)
     spec = options.starts or f"test:0-{trials - 1}"

@@ -22,10 +22,15 @@ from epuck_mj.host.command_line import command
 from epuck_mj.host.interruption import deaf_to_interrupts
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace
-from epuck_mj.trials.trajectory import record
-from evolution.judging.starts import starts_for_test
+from epuck_mj.trials.recorder import record
+from evolution.judging.starts import (
+    N_TEST,
+    held_out_disturbances,
+    starts_for_test,
+)
 from evolution.run.generation_loop import Experiment, Record
 from evolution.settings.config import ExperimentConfig
+from evolution.settings.randomness import Purpose
 
 HOST, PORT = "127.0.0.1", 9876
 """Where rerun's viewer listens."""
@@ -135,6 +140,10 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
 
     scene = load_scene(config.robot, config.arena, config.control_step)
     start = starts_for_test(FreeSpace(scene, config.start_clearance), 1)[0]
+    # as it evolves: what the first test start meets
+    met = held_out_disturbances(config.conditions, Purpose.TEST, N_TEST, config.steps)
+    if met is not None:
+        met = met[:1]
     title = f"{config.optimizer.algorithm}, seed {config.seed}"
     address = f"rerun+http://{HOST}:{port}/proxy"
     view = LiveView(address, scene, title, config.steps)
@@ -149,7 +158,7 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
             if not np.array_equal(genomes[-1], shown):
                 shown = genomes[-1]
                 policy = config.network.decode(shown)
-                trajectory = record(scene, policy, start, config.task)
+                trajectory = record(scene, policy, start, config.task, met)
                 view.trial(
                     records[-1].evaluations,
                     records[-1].generation,

@@ -13,7 +13,8 @@ from epuck_mj.scene.model import Scene
 from epuck_mj.show.figures import fitness_figure, trajectory_figure
 from epuck_mj.show.pictures import save_figure
 from epuck_mj.show.recording import Trial, save_recording
-from epuck_mj.trials.trajectory import record
+from epuck_mj.step.disturbances import Disturbances
+from epuck_mj.trials.recorder import record_trajectories
 from evolution.judging.evaluation import BatchEngine
 from evolution.judging.held_out import WHEELED_ROBOT, HeldOut, Judge, judging, tested_on
 from evolution.judging.starts import N_TEST, held_out_disturbances
@@ -78,7 +79,8 @@ def write_results(
     _draw_fitness(experiment, directory)
     wheeled = judges[WHEELED_ROBOT]
     starts = wheeled.starts(N_SHOWN)
-    _show(experiment, directory, controller, wheeled.scene, starts)
+    shown = None if met is None else met[:N_SHOWN]
+    _show(experiment, directory, controller, wheeled.scene, starts, shown)
     return controller
 
 
@@ -159,10 +161,11 @@ def _show(
     controller: ControllerFile,
     scene: Scene,
     starts: np.ndarray,
+    met: Disturbances | None,
 ) -> None:
-    """Trials of the champion on the wheeled robot: picture, file and recording."""
+    """Trials of the champion on the wheeled robot, with the disturbances they met."""
     task = experiment.config.task
-    trials = [record(scene, controller.controller, start, task) for start in starts]
+    trials = record_trajectories(scene, controller.controller, starts, task, met)
     titles = [
         f"start {i}: fitness {trial.trial_fitness:.0f}"
         for i, trial in enumerate(trials)

@@ -23,10 +23,11 @@ from epuck_mj.host.yaml_and_json import parse_yaml, to_yaml
 from epuck_mj.policies.network import Network
 from epuck_mj.scene.model_files import absolute
 from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.conditions import Conditions, NoiseLevel
 from epuck_mj.step.control import START_CLEARANCE, STEPS_MAX, TaskParameters
 from epuck_mj.step.motors import Speeds
 from evolution.search.table import ALGORITHMS, OptimizerParameters, SearchSpace
-from evolution.settings.setting import Conditions, Setting
+from evolution.settings.setting import Setting
 
 
 def _of_known_algorithm(value: Any) -> Any:
@@ -87,10 +88,6 @@ CalibrationConfig = Annotated[
         str_from_instance=lambda value: ["none" if value is None else "as stored"],
     ),
 ]
-
-
-NoiseLevel = Literal["none", "calibrated", "strong"]
-"""Keys of `epuck_mj.step.disturbances.NOISE`."""
 
 
 class ExperimentConfig(BaseModel):

@@ -4,8 +4,8 @@ from enum import IntEnum
 
 import numpy as np
 
+from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.disturbances import Disturbances
-from evolution.settings.setting import Conditions
 
 
 class Purpose(IntEnum):

@@ -2,7 +2,7 @@
 
 `same_times` takes from the robot's journal *when* commands came and sensors were read,
 and nothing else: observations, actions, commands and motion are its own, by
-`SimulatedRobots` and the functions that evolution uses. `nominal` takes nothing:
+`MujocoRobots` and the functions that evolution uses. `nominal` takes nothing:
 control steps all alike, sensors read at their ends, motors never late.
 
 Both quantise as the robot does: whole counts, whole steps/s, whole ticks a step.
@@ -15,7 +15,7 @@ import numpy as np
 from epuck_mj.bridge.fake.motors_and_sensors import MotorTimer, Wheel
 from epuck_mj.bridge.fake.mujoco_body import Journal
 from epuck_mj.rungs.disturbed import DisturbedRobots
-from epuck_mj.rungs.mujoco_batch import SimulatedRobots
+from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.control import Policy, TaskParameters, control_step
 from epuck_mj.step.disturbances import Noise, draw
@@ -47,7 +47,7 @@ def same_times(
     Raises:
         ValueError: if the journal's commands are not as many as the policy's.
     """
-    robots = SimulatedRobots(replace(scene, n_substeps=1), 1, 1)
+    robots = MujocoRobots(replace(scene, n_substeps=1), 1, 1)
     distances = [robots.reset(start[None]).distance[0]]
     poses = [robots.poses()[0]]
     wheels, pauses = (Wheel(0.0, 0.0),) * 2, np.zeros(2)
@@ -104,7 +104,7 @@ def nominal(
         n_steps: control steps.
     """
     met = draw(np.random.default_rng(0), 1, n_steps, QUIET)
-    robots = DisturbedRobots(SimulatedRobots(scene, 1, 1), met, task.control_step)
+    robots = DisturbedRobots(MujocoRobots(scene, 1, 1), met, task.control_step)
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     poses = [robots.poses()[0]]
     for _ in range(n_steps):

@@ -15,7 +15,7 @@ from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.show import colors
 from epuck_mj.show.colors import fraction
 from epuck_mj.show.figures import trajectory_figure
-from epuck_mj.trials.trajectory import record
+from epuck_mj.trials.recorder import record
 from evolution.judging.held_out import WHEELED_ROBOT
 from evolution.judging.starts import starts_for_test
 from evolution.pages.style import (

@@ -7,7 +7,7 @@ from contextlib import closing
 
 from epuck_mj.scene.model import load_scene
 from epuck_mj.step.control import TaskParameters, Trials
-from evolution.judging.evaluation import CAPACITY, BatchEngine, Work, joined
+from evolution.judging.evaluation import CAPACITY, BatchEngine, Work
 from evolution.run.execution import Means
 from evolution.settings.config import ExperimentConfig
 from evolution.study.cluster.connection import Cluster, ClusterLost
@@ -67,7 +67,7 @@ class ClusterEngine:
             self._cluster.submit("trials", _trials, self._required, self._task, part)
             for part in work.chunks(most)
         ]
-        return joined(self._cluster.results(futures))
+        return Trials.joined(self._cluster.results(futures))
 
 
 def _trials(required: Requirements, task: TaskParameters, part: Work) -> Trials:

@@ -1,0 +1,28 @@
+"""The table of rungs: by which physics a robot moves. The only door to a simulator.
+
+A rung belongs to a robot's name, since it changes results. Another one is a module with
+a `Simulator` and a line in `RUNGS`.
+"""
+
+from collections.abc import Callable, Mapping
+
+from epuck_mj.rungs.mujoco_batch import MujocoRobots
+from epuck_mj.rungs.simulator import Simulator
+from epuck_mj.scene.model import Scene
+
+RUNGS: Mapping[str, Callable[[Scene, int, int], Simulator]] = {
+    "epuck": MujocoRobots,
+    "epuck_planar": MujocoRobots,
+}
+"""How robots are made, by the robot's name; a robot of one's own moves by MuJoCo."""
+
+
+def robots_in(scene: Scene, capacity: int, threads: int = 0) -> Simulator:
+    """Robots of a scene, by the physics that their name stands for.
+
+    Args:
+        scene: robot and arena.
+        capacity: the most robots that a reset can place.
+        threads: threads that step them; 0 is one per core.
+    """
+    return RUNGS.get(scene.robot.stem, MujocoRobots)(scene, capacity, threads)
