@@ -63,6 +63,7 @@ ALLOWED_IN = {
     "dm_control": ("epuck_mj/environments/",),
     "dm_env": ("epuck_mj/environments/",),
     "imageio_ffmpeg": ("epuck_mj/show/video.py",),
+    "markdown_it": ("evolution/pages/blocks.py",),
     "matplotlib": (
         "epuck_mj/check/picture.py",
         "epuck_mj/show/",

@@ -15,10 +15,12 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from markdown_it import MarkdownIt
 from scipy import stats
 
 from epuck_mj.errors import UserError
 from evolution.pages.blocks import (
+    STYLE,
     Code,
     Heading,
     Listing,
@@ -367,24 +369,41 @@ def check_markdown(text):
     return tables
 
 
-def test_blocks_are_escaped():
-    nasty = '<b> a|b *c* `d` [e](f) & "g" _h_ epuck_planar'
+NASTY = (
+    '<b> a|b *c* `d` [e](f) & "g" _h_ epuck_planar',
+    "__a__ _b c_d_ &amp; &#35; ~~e~~ ![f](g) <mailto:a@b> \\* \\",
+    "[a]: /b",
+    *("- a", "+ a", "1. a", "23) a", "# a #", "> a", "***", "___", "```", "    a"),
+)
+
+
+@pytest.mark.parametrize("nasty", NASTY)
+def test_text_stands_for_itself(nasty):
+    code = [nasty, "a < b && c", "``` x", "*d*"]
     blocks = [
         Heading(nasty, 1),
         Paragraph(nasty),
-        Listing([nasty, "- x"]),
-        Code(["a < b && c"]),
+        Listing([nasty, "x"]),
+        Code(code),
         Table(("x", nasty), [("1", nasty)]),
         Picture("p", nasty, b"<svg/>"),
     ]
     page = to_html(nasty, blocks)
-    assert check_html(page).count(nasty) == 7
+    words = " ".join(nasty.split())
+    plain = " ".join(" ".join(code).split())
+    style = " ".join(STYLE.split())
+    texts = (words, style, words, words, words, "x", plain, "x", *[words, "1"], words)
+    assert check_html(page) == " ".join([*texts, words])
     text = to_markdown(blocks)
     assert len(check_markdown(text)) == 1
-    assert r"\<b> a\|b \*c\* \`d\` [e\](f) & " in text
-    assert r"\_h\_ epuck_planar" in text
-    assert "\n- \\- x" in text
-    plain = "1 [2, 3] p < 0.1 & so"
+    # in one piece it is the same document
+    whole = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
+    for part in re.findall(r"<(h1|ul|pre|table)>(.*?)</\1>", page, re.DOTALL):
+        assert "<{0}>{1}</{0}>".format(*part) in whole
+
+
+def test_numbers_stay_readable():
+    plain = "1 [2, 3] p < 0.1 & so, 3-5 runs of epuck_planar (#1)."
     assert to_markdown([Paragraph(plain)]) == f"{plain}\n"
 
 
