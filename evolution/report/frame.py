@@ -6,9 +6,10 @@ from evolution.judging.starts import N_VALIDATION
 from evolution.pages.blocks import Block, Code, Heading, Listing, Paragraph, Table
 from evolution.pages.words import NOTHING, evaluations, label, robot_name, spread
 from evolution.report.samples import tests_of
-from evolution.report.summary import commands, config_differences
+from evolution.report.summary import commands
 from evolution.report.tables import control_steps, provenance, shown_robots
 from evolution.run.champion import BEST_OF_POPULATION, LATEST_BEST
+from evolution.settings.config import differences
 from evolution.study.config import seeds_text
 from evolution.study.data import StudyData
 
@@ -138,8 +139,8 @@ def how_to_reproduce(data: StudyData, output: str, ioh: bool) -> list[Block]:
             ]
         ),
     ]
-    differences = config_differences(data)
-    if differences:
+    differing = differences(data.configs, ("seed",))
+    if differing:
         names = list(data.configs)
         blocks += [
             Paragraph("The experiments differ in these keys:"),
@@ -147,7 +148,7 @@ def how_to_reproduce(data: StudyData, output: str, ioh: bool) -> list[Block]:
                 ("key", *(label(name) for name in names)),
                 [
                     (key, *(str(values.get(name, NOTHING)) for name in names))
-                    for key, values in differences.items()
+                    for key, values in differing.items()
                 ],
             ),
         ]

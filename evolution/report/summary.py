@@ -24,24 +24,9 @@ from evolution.report.samples import (
 from evolution.report.successes import success_rows
 from evolution.report.tables import provenance, run_rows, shown_robots, target_rows
 from evolution.run.directory import RunDirectory
-from evolution.settings.config import ExperimentConfig, flat
+from evolution.settings.config import ExperimentConfig, differences, flat
 from evolution.statistics.samples import quartiles, rank_correlation
 from evolution.study.data import StudyData
-
-
-def config_differences(data: StudyData) -> dict[str, dict[str, Any]]:
-    """Keys in which the experiments differ, and the value of each that has it."""
-    each = {name: _keys(config) for name, config in data.configs.items()}
-    keys = dict.fromkeys(key for fields in each.values() for key in fields)
-    found = {
-        key: {name: fields[key] for name, fields in each.items() if key in fields}
-        for key in keys
-    }
-    return {
-        key: values
-        for key, values in found.items()
-        if len(values) < len(each) or len(set(map(repr, values.values()))) > 1
-    }
 
 
 def commands(data: StudyData, output: str, ioh: bool) -> dict[str, str]:
@@ -84,7 +69,7 @@ def summary(data: StudyData, output: str, ioh: bool) -> dict[str, Any]:
             "robots": list(shown_robots(data)),
             "missing": list(data.missing),
             "experiments": {name: _experiment(data, name) for name in data.configs},
-            "config_differences": config_differences(data),
+            "config_differences": differences(data.configs, ("seed",)),
             "configs": {name: _keys(config) for name, config in data.configs.items()},
             "yardstick": data.yardstick,
             "runs": run_rows(data),

@@ -20,7 +20,7 @@ from evolution.reproduce.verdicts import (
     of_most,
     of_order,
 )
-from evolution.settings.config import flat
+from evolution.settings.config import differences
 from evolution.study.config import StudyConfig, find_study
 from evolution.study.data import StudyData
 
@@ -98,11 +98,12 @@ def unlike(study: StudyData) -> list[str]:
     for name in PAPERS:
         if name not in study.configs:
             continue
-        theirs, ours = flat(shipped[name]), flat(study.configs[name])
+        found = differences(
+            {"shipped": shipped[name], "ours": study.configs[name]}, ("seed", "robot")
+        )
         differing = [
-            f"{key} {ours.get(key)} (shipped {theirs.get(key)})"
-            for key in dict.fromkeys([*theirs, *ours])
-            if key not in ("seed", "robot") and theirs.get(key) != ours.get(key)
+            f"{key} {values.get('ours')} (shipped {values.get('shipped')})"
+            for key, values in found.items()
         ]
         if differing:
             lines.append(f"{name}: {', '.join(differing)}")
