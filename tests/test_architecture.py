@@ -68,10 +68,11 @@ ALLOWED_IN = {
         "epuck_mj/check/picture.py",
         "epuck_mj/show/",
         "evolution/gap/figure.py",
-        "evolution/pages/",
+        "evolution/pages/figure_files.py",
+        "evolution/pages/style.py",
         "evolution/report/figures/",
     ),
-    "rerun": ("epuck_mj/show/recording/",),
+    "rerun": ("epuck_mj/show/recording/", "evolution/replay/viewer_picture.py"),
     "serial": ("epuck_mj/bridge/line/serial_port.py",),
     "yaml": ("epuck_mj/host/yaml_and_json.py",),
 }

@@ -22,7 +22,7 @@ from epuck_mj.trials.recorder import record_tracks
 from evolution.judging.evaluation import CAPACITY
 from evolution.judging.starts import N_TEST, starts_for_test
 from evolution.settings.setting import Setting
-from evolution.statistics.samples import mean_interval, worst_share_mean
+from evolution.statistics.estimates import mean_interval, worst_share_mean
 
 WHEELED_ROBOT, PLANAR_ROBOT = "epuck", "epuck_planar"
 """Every champion is reported on the first, whatever it was evolved on, and what was

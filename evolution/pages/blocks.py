@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from markdown_it import MarkdownIt
 
-FIGURES = "figures"
+FIGURES_FOLDER = "figures"
 """Folder of the pictures, beside the Markdown file."""
 
 STYLE = """
@@ -109,7 +109,7 @@ def _markdown(block: Block) -> str:
             lines = [map(_escaped, columns), rule, *(map(_escaped, r) for r in rows)]
             return "\n".join(f"| {' | '.join(line)} |" for line in lines)
         case Picture(name, caption):
-            link = f"![{_escaped(name)}](<{FIGURES}/{name}.png>)"
+            link = f"![{_escaped(name)}](<{FIGURES_FOLDER}/{name}.png>)"
             return f"{link}\n\n*{_escaped(caption)}*"
 
 
