@@ -20,7 +20,7 @@ import yaml
 from distributed import Client
 
 from epuck_mj.errors import UserError
-from evolution.run.execution import Means
+from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from evolution.study.__main__ import study

@@ -16,7 +16,8 @@ from epuck_mj.step.calibration import Calibration
 from evolution.evaluate import evaluate
 from evolution.judging.held_out import Judge
 from evolution.run.directory import RunDirectory
-from evolution.run.execution import Means, Run
+from evolution.run.execution import Run
+from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from evolution.verify import verify

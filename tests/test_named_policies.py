@@ -15,7 +15,8 @@ from epuck_mj.step.control import TaskParameters
 from evolution.named_policies import NamedPolicy, described, named_policies
 from evolution.replay.trials import labels
 from evolution.run.directory import RunDirectory
-from evolution.run.execution import Means, Run
+from evolution.run.execution import Run
+from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 

@@ -23,7 +23,7 @@ from evolution.judging.held_out import Judge
 from evolution.run import execution, results
 from evolution.run.__main__ import run
 from evolution.run.directory import LOCK, RunDirectory
-from evolution.run.execution import Means
+from evolution.run.means import Means
 from evolution.settings.config_files import load_config
 from evolution.study import __main__ as module
 from evolution.study import jobs

@@ -6,35 +6,18 @@ out, and however often it is interrupted, the same config leaves the same bytes.
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from epuck_mj.host.files import writing
 from epuck_mj.policies.file import ControllerFile
-from evolution.judging.evaluation import Engine
 from evolution.run.directory import RunDirectory
 from evolution.run.generation_loop import Experiment, Record
+from evolution.run.means import Means
 from evolution.run.provenance import provenance
 from evolution.run.results import judges, write_results
 from evolution.settings.config import ExperimentConfig
 
 SAVING_SHARE = 0.05
 """Most of the time that goes into checkpoints, where generations are short."""
-
-
-@dataclass(frozen=True)
-class Means:
-    """How a run is carried out, which changes none of its results.
-
-    Attributes:
-        engine: one of `generation_loop.ENGINES`, or an engine whose `str` is what
-            the provenance calls it.
-        threads: that step the robots; 0 is one per core.
-        racing: break off individuals that can only lose.
-    """
-
-    engine: str | Engine = "batch"
-    threads: int = 0
-    racing: bool = True
 
 
 class Run:

@@ -10,9 +10,6 @@ import numpy as np
 from epuck_mj.host import files
 from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.scene.model import Scene
-from epuck_mj.show.figures import fitness_figure, trajectory_figure
-from epuck_mj.show.pictures import save_figure
-from epuck_mj.show.recording import Trial, save_recording
 from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.trials.recorder import record_trajectories
 from evolution.judging.evaluation import BatchEngine
@@ -144,6 +141,9 @@ def _controller_file(
 
 
 def _draw_fitness(experiment: Experiment, directory: RunDirectory) -> None:
+    from epuck_mj.show.figures import fitness_figure
+    from epuck_mj.show.pictures import save_figure
+
     records = experiment.records
     figure = fitness_figure(
         [record.evaluations for record in records],
@@ -164,6 +164,10 @@ def _show(
     met: Disturbances | None,
 ) -> None:
     """Trials of the champion on the wheeled robot, with the disturbances they met."""
+    from epuck_mj.show.figures import trajectory_figure
+    from epuck_mj.show.pictures import save_figure
+    from epuck_mj.show.recording import Trial, save_recording
+
     task = experiment.config.task
     trials = record_trajectories(scene, controller.controller, starts, task, met)
     titles = [

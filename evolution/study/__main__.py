@@ -19,8 +19,7 @@ from epuck_mj.host.interruption import Interrupted, Interruption
 from epuck_mj.policies import file as controller_file
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
 from evolution.run.directory import RunDirectory, locked
-from evolution.run.execution import Means
-from evolution.run.results import judges, scores
+from evolution.run.means import Means
 from evolution.study.config import StudyConfig, find_study, parse_seeds
 from evolution.study.directory import PATIENCE, StudyDirectory
 from evolution.study.jobs import Event, Job, carry_out_side_by_side
@@ -124,6 +123,8 @@ def _measure_yardstick(directory: StudyDirectory) -> None:
     """Test the hand-written wall follower as champions are, unless it was before."""
     if directory.yardstick.exists():
         return
+    from evolution.run.results import judges
+
     # in the setting of the first experiment
     config = next(iter(directory.stored_config().experiments.values()))
     tests = {
@@ -200,6 +201,8 @@ def _shown(
 
 def _line(job: Job) -> str:
     """What a finished run has found."""
+    from evolution.run.results import scores
+
     return f"{job}: " + scores(
         controller_file.load(RunDirectory(job.directory).champion)
     )
