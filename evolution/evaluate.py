@@ -14,7 +14,8 @@ from epuck_mj.host.command_line import check_threads, main, parse
 from epuck_mj.policies.wall_follower import YARDSTICK
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.disturbances import Disturbances
-from evolution.judging.held_out import HeldOut, judging, tested_on
+from evolution.judging.held_out import judging, tested_on
+from evolution.judging.scores import HeldOut
 from evolution.judging.starts import N_TEST, held_out_disturbances
 from evolution.named_policies import named_policies
 from evolution.settings.config import NoiseLevel
@@ -103,7 +104,7 @@ def evaluate(argv: Sequence[str]) -> int:
                 "robot": robot,
                 "arena": arena,
             }
-            tests.append(where | asdict(conditions) | asdict(test))
+            tests.append(where | asdict(conditions) | test.to_dict())
     if options.json is not None:
         with files.writing():
             files.write_text(options.json, json.dumps(tests, indent=1) + "\n")

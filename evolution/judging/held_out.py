@@ -3,8 +3,7 @@
 The numbers that a study reports.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import cache
 from typing import Self
 
@@ -21,6 +20,7 @@ from epuck_mj.trials.behaviour_classes import class_shares
 from epuck_mj.trials.metrics import behaviour
 from epuck_mj.trials.tracks import record_tracks
 from evolution.judging.evaluation import CAPACITY
+from evolution.judging.scores import HeldOut
 from evolution.judging.starts import N_TEST, starts_for_test
 from evolution.settings.setting import Setting
 from evolution.statistics.samples import mean_interval, worst_share_mean
@@ -31,34 +31,6 @@ evolved on it on the second as well."""
 
 INTERVAL_SEED = 0
 """Of the bootstrap's resamples, so that the same trials give the same interval."""
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """A controller on `starts` fresh starts.
-
-    Attributes:
-        mean: fitness over the starts.
-        standard_deviation: of the fitness of a start.
-        interval: bootstrap 95 % confidence bounds of the mean.
-        worst: mean of the worst 5 % of the starts.
-        crash_rate: share of the trials that ended in a crash.
-        collisions_per_minute: crashes per minute lived.
-        starts: how many there were.
-        behaviour: share of the trials by behaviour class.
-        metrics: mean of each of `trials.metrics.Behaviour` over the trials that have
-            it, None if none has.
-    """
-
-    mean: float
-    standard_deviation: float
-    interval: tuple[float, float]
-    worst: float
-    crash_rate: float
-    collisions_per_minute: float
-    starts: int
-    behaviour: Mapping[str, float]
-    metrics: Mapping[str, float | None]
 
 
 class Everybody:

@@ -15,7 +15,7 @@ import tyro
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import check_threads, command, main, parse
 from epuck_mj.host.interruption import Interrupted, Interruption
-from epuck_mj.policies.file import ControllerFile
+from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
 from evolution.run.execution import Means, Run
 from evolution.run.live import Live, require_viewer
@@ -130,7 +130,7 @@ def _carry_out(evolution: Run, live: bool) -> int:
     with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:
         try:
             with interruption.raising():
-                controller = _finished(evolution, live)
+                scores = _finished(evolution, live)
         except Interrupted:
             print(
                 f"Interrupted after {directory.evaluations():,} evaluations; go on "
@@ -144,14 +144,14 @@ def _carry_out(evolution: Run, live: bool) -> int:
         f"{experiment.evaluations:,} evaluations in {len(experiment.records)} "
         f"generations, {minutes} min {seconds} s"
     )
-    print(summary(controller))
+    print(summary(scores, experiment.config.steps))
     print(f"Written to {directory.path}: {directory.contents()}")
     print(_replay(directory))
     return 0
 
 
-def _finished(evolution: Run, live: bool) -> ControllerFile:
-    """Evolve, and choose the champion."""
+def _finished(evolution: Run, live: bool) -> Scores:
+    """Scores of the champion, once evolved and chosen."""
     experiment = evolution.experiment
     budget = experiment.config.evaluations
     with (

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from epuck_mj.host.files import writing
-from epuck_mj.policies.file import ControllerFile
 from evolution.judging.evaluation import Engine
+from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
 from evolution.run.generation_loop import Experiment, Record
 from evolution.run.provenance import provenance
@@ -100,15 +100,15 @@ class Run:
                 cost, seconds = before - after, []
             yield record
 
-    def finish(self) -> ControllerFile:
-        """Choose the champion, test it, and write all that shows it.
+    def finish(self) -> Scores:
+        """Scores of the champion: it is chosen, tested, and all written that shows it.
 
         Raises:
             UserError: if it cannot be written.
         """
         with writing():
-            controller = write_results(
+            scores = write_results(
                 self.experiment, self._judges, self.directory, self._threads
             )
         self.directory.mark_finished()
-        return controller
+        return scores
