@@ -1,5 +1,7 @@
 """The findings of a report, per experiment: fitness, rungs, luck and behaviour."""
 
+import math
+
 import numpy as np
 
 from epuck_mj.trials.behaviour_classes import HUG, MEANINGS
@@ -16,15 +18,13 @@ from evolution.pages.words import (
 )
 from evolution.report.samples import (
     class_means,
-    clearance,
     clearances,
+    crash_rates,
     disturbed,
     kept,
-    known,
     like_for_like,
     most_believed,
     tests_of,
-    whole_lap_share,
     whole_laps,
 )
 from evolution.report.tables import shown_robots
@@ -40,16 +40,14 @@ def held_out_fitness(data: StudyData) -> list[Block]:
         row = [label(name), str(len(runs))]
         for robot in robots:
             sample = data.held_out(name, robot)
-            crashes = known(tests_of(data, name, robot), "crash_rate")
+            crashes = crash_rates(tests_of(data, name, robot))
             row += [spread(sample), f"{sample.max():.1f}", _percent_median(crashes)]
         rows.append([*row, spread(data.best_stored(name))])
     if data.yardstick:
         row = [YARDSTICK_LABEL, NOTHING]
         for robot in robots:
-            test = data.yardstick.get(robot, {})
-            mean = test.get("mean")
-            row += ["-" if mean is None else f"{mean:.1f}", NOTHING]
-            row.append(percent(test.get("crash_rate")))
+            test = data.yardstick[robot]
+            row += [f"{test.mean:.1f}", NOTHING, percent(test.crash_rate)]
         rows.append([*row, NOTHING])
     columns = ["experiment", "n"]
     for robot in robots:
@@ -72,14 +70,14 @@ def _as_evolved(data: StudyData) -> list[Block]:
     """The same on disturbed robots, of experiments that evolved on such."""
     rows = []
     for name, runs in data.with_runs.items():
-        found = [run.champion.scores.get("held_out_as_evolved") for run in runs]
+        found = [run.scores.held_out_as_evolved for run in runs]
         tests = [each for each in found if each]
         if tests:
             row = [label(name), str(len(tests))]
             for robot in shown_robots(data):
-                row.append(spread(known([each[robot] for each in tests], "mean")))
-                crashes = known([each[robot] for each in tests], "crash_rate")
-                row.append(_percent_median(crashes))
+                on_robot = [each[robot] for each in tests]
+                row.append(spread(np.array([test.mean for test in on_robot])))
+                row.append(_percent_median(crash_rates(on_robot)))
             rows.append(row)
     if not rows:
         return []
@@ -211,17 +209,17 @@ def behaviour(data: StudyData) -> list[Block]:
             )
         )
     for robot in shown_robots(data):
-        test = data.yardstick.get(robot, {})
-        if test.get("behaviour"):
-            near = clearance(test)
+        test = data.yardstick.get(robot)
+        if test and test.behaviour:
+            near = test.clearance
             rows.append(
                 (
                     YARDSTICK_LABEL,
                     robot_name(robot),
-                    *(percent(test["behaviour"].get(c, 0.0)) for c in seen),
-                    NOTHING if near is None else f"{near * 1000:.1f}",
+                    *(percent(test.behaviour.get(c, 0.0)) for c in seen),
+                    NOTHING if math.isnan(near) else f"{near * 1000:.1f}",
                     NOTHING,
-                    percent(whole_lap_share(test)),
+                    percent(test.whole_laps),
                 )
             )
     return [

@@ -7,11 +7,10 @@ and robot.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
-from evolution.report.samples import FOLLOWING, following_share
+from evolution.report.samples import FOLLOWING
 from evolution.report.tables import shown_robots
 from evolution.statistics.comparisons import FEWEST_FOR_STARS, LEVELS, fisher, holm
 from evolution.statistics.samples import wilson
@@ -96,13 +95,9 @@ def _criteria(data: StudyData, robot: str) -> dict[str, Callable[[RunData], bool
     if reference is not None:
         found[MATCHES] = lambda run: run.held_out(robot) >= reference
     everything = [run for runs in data.runs.values() for run in runs]
-    if all(_test_of(run, robot).get("behaviour") for run in everything):
-        found[FOLLOWS] = lambda run: following_share(_test_of(run, robot)) >= FOLLOWING
+    if all(run.scores.held_out[robot].behaviour for run in everything):
+        found[FOLLOWS] = lambda run: run.scores.held_out[robot].following >= FOLLOWING
     return found
-
-
-def _test_of(run: RunData, robot: str) -> Any:
-    return run.champion.scores["held_out"][robot]
 
 
 def _successes(

@@ -15,9 +15,9 @@ from evolution.report.pairs import pair_rows
 from evolution.report.samples import (
     class_means,
     clearances,
+    crash_rates,
     disturbed,
     kept,
-    known,
     most_believed,
     tests_of,
 )
@@ -86,7 +86,9 @@ def summary(data: StudyData, output: str, ioh: bool) -> dict[str, Any]:
             "experiments": {name: _experiment(data, name) for name in data.configs},
             "config_differences": config_differences(data),
             "configs": {name: _keys(config) for name, config in data.configs.items()},
-            "yardstick": data.yardstick,
+            "yardstick": {
+                robot: test.to_dict() for robot, test in data.yardstick.items()
+            },
             "runs": run_rows(data),
             "pairwise": list(map(asdict, pair_rows(data))),
             "success": list(map(asdict, success_rows(data))),
@@ -117,9 +119,7 @@ def _experiment(data: StudyData, name: str) -> dict[str, Any]:
         "held_out": {
             robot: {
                 "fitness": _described(data.held_out(name, robot)),
-                "crash_rate": _described(
-                    known(tests_of(data, name, robot), "crash_rate")
-                ),
+                "crash_rate": _described(crash_rates(tests_of(data, name, robot))),
                 # of experiments with noise, stored fitness is another quantity
                 "share_of_stored": None
                 if disturbed(data, name)

@@ -15,12 +15,12 @@ import tyro
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import check_threads, command, main, parse
 from epuck_mj.host.interruption import Interrupted, Interruption
+from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import DEFAULT_EXPERIMENT, find_config, load_config
 
 if TYPE_CHECKING:
-    from epuck_mj.policies.file import ControllerFile
     from evolution.run.execution import Run
 
 MODULE = "evolution.run"
@@ -135,7 +135,7 @@ def _carry_out(evolution: "Run", live: bool) -> int:
     with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:
         try:
             with interruption.raising():
-                controller = _finished(evolution, live)
+                scores = _finished(evolution, live)
         except Interrupted:
             print(
                 f"Interrupted after {directory.evaluations():,} evaluations; go on "
@@ -149,16 +149,14 @@ def _carry_out(evolution: "Run", live: bool) -> int:
         f"{experiment.evaluations:,} evaluations in {len(experiment.records)} "
         f"generations, {minutes} min {seconds} s"
     )
-    from evolution.run.results import summary
-
-    print(summary(controller))
+    print(scores.in_lines(experiment.config.steps))
     print(f"Written to {directory.path}: {directory.contents()}")
     print(_replay(directory))
     return 0
 
 
-def _finished(evolution: "Run", live: bool) -> "ControllerFile":
-    """Evolve, and choose the champion."""
+def _finished(evolution: "Run", live: bool) -> Scores:
+    """Scores of the champion, once evolved and chosen."""
     from evolution.run.live import Live
     from evolution.run.progress import Progress
 
