@@ -43,7 +43,7 @@ NUMPY_ONLY = (
     "epuck_mj/step/motors.py",
     "epuck_mj/step/sensors.py",
     "epuck_mj/policies/",
-    "epuck_mj/bridge/errors.py",
+    "epuck_mj/bridge/failures.py",
     "epuck_mj/bridge/language/",
     "epuck_mj/bridge/fake/builds.py",
     "epuck_mj/bridge/fake/firmware.py",

@@ -23,7 +23,7 @@ from epuck_mj.bridge.fake.virtual import VirtualPort, VirtualTime
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.bridge.line.wifi_line import WifiLine
-from epuck_mj.calibrate.__main__ import accomplish, calibrate
+from epuck_mj.calibrate.__main__ import calibrate, calibrate_robot
 from epuck_mj.calibrate.fitting import (
     SATURATED,
     fit_gains,
@@ -300,7 +300,7 @@ class World:
 
     def calibrate(self, output, *steps):
         try:
-            return accomplish(
+            return calibrate_robot(
                 steps or tuple(STEPS),
                 output,
                 self.connect,

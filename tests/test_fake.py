@@ -13,13 +13,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from epuck_mj.bridge.errors import LinkLost
+from epuck_mj.bridge.failures import LinkLost
 from epuck_mj.bridge.fake.__main__ import fake
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Endpoint, Pty, Tcp, serve
 from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import scenario
-from epuck_mj.bridge.language.protocol import RESYNC, Steps, ascii
+from epuck_mj.bridge.language import ascii
+from epuck_mj.bridge.language.protocol import RESYNC
+from epuck_mj.bridge.language.replies import Steps
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.bridge.line.serial_port import SerialPort
@@ -172,7 +174,7 @@ def test_a_port_vanishes_and_returns(endpoint, planar):
         link = Link(lambda: SerialPort(name))
         try:
             link.resync(time.monotonic() + PATIENCE)
-            link.ask(ascii.drive(300, 300))
+            link.ask(ascii.drive_order(300, 300))
             with pytest.raises(LinkLost):
                 while True:
                     link.drain(time.monotonic() + 0.02)
@@ -181,7 +183,7 @@ def test_a_port_vanishes_and_returns(endpoint, planar):
             link.reopen(time.monotonic() + PATIENCE)
             assert endpoint.name == name
             link.resync(time.monotonic() + PATIENCE)
-            link.ask(ascii.stop())
+            link.ask(ascii.stop_order())
             assert emulator.body.standing
         finally:
             link.close()

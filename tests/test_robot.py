@@ -10,7 +10,7 @@ from epuck_mj.bridge.drive.odometry import Odometry
 from epuck_mj.bridge.drive.robot import RealRobot
 from epuck_mj.bridge.drive.schedule import Schedule
 from epuck_mj.bridge.drive.session import Session
-from epuck_mj.bridge.errors import (
+from epuck_mj.bridge.failures import (
     BridgeError,
     LinkLost,
     RobotRestarted,
@@ -24,7 +24,7 @@ from epuck_mj.bridge.fake.reference import deviation, nominal, same_times
 from epuck_mj.bridge.fake.scenarios import Fault, random_scenario, scenario
 from epuck_mj.bridge.fake.virtual import VirtualPort, VirtualTime
 from epuck_mj.bridge.language.replies import Cycle, Proximity, Steps, wrapped
-from epuck_mj.bridge.line.connection import Greeting
+from epuck_mj.bridge.line.interfaces import Greeting
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.constants import SPEED_MAX, TRACK, WHEEL_RADIUS, WHEEL_SPEED_MAX

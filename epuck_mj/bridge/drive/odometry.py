@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from epuck_mj.bridge.errors import BridgeError
+from epuck_mj.bridge.failures import BridgeError
 from epuck_mj.bridge.language.replies import Steps, wrapped
 from epuck_mj.constants import STEP_RATE_MAX_2
 from epuck_mj.step.calibration import Calibration

@@ -10,13 +10,13 @@ import numpy as np
 
 from epuck_mj.bridge.drive.odometry import Odometry
 from epuck_mj.bridge.drive.schedule import Schedule
-from epuck_mj.bridge.errors import (
+from epuck_mj.bridge.failures import (
     BridgeError,
     LinkLost,
     RobotRestarted,
     StaleReading,
 )
-from epuck_mj.bridge.line.connection import Connection, Greeting
+from epuck_mj.bridge.line.interfaces import Connection, Greeting
 from epuck_mj.constants import READING_AGE_MAX
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.motors import STEP_ANGLE, step_rates
@@ -45,10 +45,10 @@ class Moment:
 class RealRobot:
     """A robot on a connection; leaving its `with` block stops it, whatever happened.
 
-    A control step is two questions. As it starts, its speeds, if they changed: that is
-    `checked_cycle` with D, and the answer shows that they arrived. As it ends, the
-    reading. So the policy decides on what is sensed at that moment, as in simulation,
-    and not on what was sensed a control step ago.
+    A control step is two questions. As it starts, its speeds, if they changed: the echo
+    in the answer shows that they arrived. As it ends, the reading. So the policy
+    decides on what is sensed at that moment, as in simulation, and not on what was
+    sensed a control step ago.
 
     Attributes:
         schedule: when control steps end.

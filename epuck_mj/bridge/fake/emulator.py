@@ -35,7 +35,7 @@ class Talker(Protocol):
 WIFI = "wifi"
 """The e-puck2 behind its radio."""
 
-ROBOTS = (*BUILDS, WIFI)
+EMULATED_ROBOTS = (*BUILDS, WIFI)
 """The robots that can be emulated."""
 
 
@@ -60,7 +60,7 @@ class Emulator:
 
         Args:
             body: of the robot.
-            robot: one of ROBOTS.
+            robot: one of EMULATED_ROBOTS.
             now: the time [s].
             faults: what goes wrong.
             latency: of each way [s], beside the UART's.
@@ -69,8 +69,9 @@ class Emulator:
         Raises:
             UserError: if there is no such robot.
         """
-        if robot not in ROBOTS:
-            raise UserError(f"no robot '{robot}'; available: {', '.join(ROBOTS)}")
+        if robot not in EMULATED_ROBOTS:
+            names = ", ".join(EMULATED_ROBOTS)
+            raise UserError(f"no robot '{robot}'; available: {names}")
         self.body = body
         self._robot = robot
         self._faults = tuple(faults)

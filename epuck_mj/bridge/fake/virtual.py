@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from epuck_mj.bridge.errors import LinkLost
+from epuck_mj.bridge.failures import LinkLost
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.line.serial_port import POLL_TIME
 from epuck_mj.errors import UserError
@@ -64,7 +64,7 @@ class VirtualTime:
 
 
 class VirtualPort:
-    """Where a host meets a robot in virtual time; see `connection.Port`."""
+    """Where a host meets a robot in virtual time; see `interfaces.Port`."""
 
     def __init__(self, time: VirtualTime) -> None:
         """Open it.

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from epuck_mj.bridge.errors import BridgeError, RobotRestarted
+from epuck_mj.bridge.failures import BridgeError, RobotRestarted
 from epuck_mj.constants import REPLY_TIME_MAX
 
 T = TypeVar("T")

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from epuck_mj.bridge.errors import BridgeError
+from epuck_mj.bridge.failures import BridgeError
 from epuck_mj.constants import N_PROXIMITY, N_SELECTOR, PROXIMITY_COUNT_MAX
 
 
@@ -102,7 +102,7 @@ class Steps:
 
 
 @dataclass(frozen=True)
-class Speeds:
+class CommandedSpeeds:
     """The speeds last commanded, as they came; nobody measures them.
 
     Attributes:

@@ -1,13 +1,9 @@
 """What a bridge asks of a port and of a robot, whichever they are."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
 from epuck_mj.bridge.language.replies import Cycle
-
-Clock = Callable[[], float]
-"""Seconds, from anywhere, never going back."""
 
 
 class Port(Protocol):

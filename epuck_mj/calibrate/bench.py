@@ -13,8 +13,8 @@ from typing import TypeVar
 import numpy as np
 
 from epuck_mj.bridge.drive.robot import RealRobot
-from epuck_mj.bridge.errors import BridgeError, StillMoving
-from epuck_mj.bridge.line.connection import Clock, Connection
+from epuck_mj.bridge.failures import BridgeError, StillMoving
+from epuck_mj.bridge.line.interfaces import Connection
 from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import Interruption
 from epuck_mj.step.calibration import Calibration
@@ -66,7 +66,7 @@ class Bench:
 
     connect: Callable[[], Connection]
     interruption: Interruption
-    clock: Clock
+    clock: Callable[[], float]
     sleep: Callable[[float], None]
 
     def with_robot(self, calibration: Calibration, job: Callable[[RealRobot], T]) -> T:
@@ -102,7 +102,7 @@ def zero(bench: Bench, calibration: Calibration) -> None:
     bench.with_robot(calibration, RealRobot.calibrate)
 
 
-def straight(bench: Bench, calibration: Calibration) -> float:
+def drive_straight(bench: Bench, calibration: Calibration) -> float:
     """Drive straight on for about N_STEPS; the steps that the motors made."""
 
     def job(robot: RealRobot) -> float:
@@ -113,7 +113,7 @@ def straight(bench: Bench, calibration: Calibration) -> float:
     return bench.with_robot(calibration, job)
 
 
-def turn(bench: Bench, calibration: Calibration) -> float:
+def turn_on_the_spot(bench: Bench, calibration: Calibration) -> float:
     """Turn left for about N_TURNS; the steps that each motor made."""
 
     def job(robot: RealRobot) -> float:
