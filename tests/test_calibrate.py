@@ -19,7 +19,6 @@ from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Pty
 from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import scenario
-from epuck_mj.bridge.fake.virtual import VirtualPort, VirtualTime
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.bridge.line.wifi_line import WifiLine
@@ -53,6 +52,7 @@ from epuck_mj.step.sensors import counted, proximity
 from tests.processes import PATIENCE, python_process
 from tests.test_bridge import BUSY
 from tests.test_fake import behind, living, wait_for
+from tests.virtual_time import VirtualPort, VirtualTime
 
 GAINS = np.array([0.62, 1.45, 0.9, 1.1, 0.75, 1.3, 1.0, 1.2])
 RADII = (0.01995, 0.02025)

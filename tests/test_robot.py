@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.bridge import at_control_steps
 from epuck_mj.bridge.drive.odometry import Odometry
 from epuck_mj.bridge.drive.robot import RealRobot
 from epuck_mj.bridge.drive.schedule import Schedule
@@ -20,9 +19,7 @@ from epuck_mj.bridge.failures import (
 from epuck_mj.bridge.fake.builds import BUILDS
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.mujoco_body import MujocoBody
-from epuck_mj.bridge.fake.reference import deviation, nominal, same_times
 from epuck_mj.bridge.fake.scenarios import Fault, random_scenario, scenario
-from epuck_mj.bridge.fake.virtual import VirtualPort, VirtualTime
 from epuck_mj.bridge.language.replies import Cycle, Proximity, Steps, wrapped
 from epuck_mj.bridge.line.interfaces import Greeting
 from epuck_mj.bridge.line.link import Link
@@ -36,6 +33,8 @@ from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.motors import STEP_ANGLE, actual_rates
 from epuck_mj.step.sensors import sensed_distance
+from tests.bridge_reference import at_control_steps, deviation, nominal, same_times
+from tests.virtual_time import VirtualPort, VirtualTime
 
 TASK = TaskParameters()
 CENTRE = np.zeros(3)

@@ -22,7 +22,7 @@ from epuck_mj.step.disturbances import Noise, draw
 from epuck_mj.step.motors import STEP_ANGLE, command, step_rates
 from epuck_mj.step.sensors import observe, proximity, sensed_distance
 
-QUIET = Noise(counts=0.0, wheels=0.0, age=0.0)
+EXACT = Noise(counts=0.0, wheels=0.0, age=0.0)
 """Whole counts and whole steps, and nothing else."""
 
 
@@ -103,7 +103,7 @@ def nominal(
         start: pose `(3,)`: x, y [m], yaw [rad].
         n_steps: control steps.
     """
-    met = draw(np.random.default_rng(0), 1, n_steps, QUIET)
+    met = draw(np.random.default_rng(0), 1, n_steps, EXACT)
     robots = DisturbedRobots(SimulatedRobots(scene, 1, 1), met, task.control_step)
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     poses = [robots.poses()[0]]
@@ -111,6 +111,18 @@ def nominal(
         observation = control_step(robots, policy, observation, task).observation
         poses.append(robots.poses()[0])
     return np.array(poses)
+
+
+def drive_steps(journal: Journal) -> list[int]:
+    """Physics steps made when each command came that moved the robot."""
+    rows = zip(journal.command_step, journal.command, strict=True)
+    return [step for step, row in rows if row[0] or row[2]]
+
+
+def at_control_steps(scene: Scene, journal: Journal, n_steps: int) -> np.ndarray:
+    """Poses `(n, 3)` from the first command on, a control step apart."""
+    first = drive_steps(journal)[0]
+    return np.array(journal.pose)[first :: scene.n_substeps][: n_steps + 1]
 
 
 def deviation(poses: np.ndarray, others: np.ndarray) -> tuple[float, float]:
