@@ -434,6 +434,30 @@ def test_list_of_ports():
     assert (done.returncode, done.stderr) == (0, "")
 
 
+LOADED = """
+import contextlib, io, runpy, sys
+for argument in ("--help", "--list-ports", "--nonsense"):
+    sys.argv = ["x", argument]
+    with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
+        runpy.run_module("MODULE", run_name="__main__")
+heavy = {"mujoco", "dm_control", "scipy", "rerun", "matplotlib"}
+print(*sorted(heavy & set(sys.modules)))
+"""
+"""What a command loads that only has to say something."""
+
+
+@pytest.mark.parametrize("module", ["bridge", "bridge.fake", "calibrate"])
+def test_help_costs_no_physics(module):
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED.replace("MODULE", f"epuck_mj.{module}")],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert (done.returncode, done.stdout.strip()) == (0, ""), done.stderr
+    assert "error: Unrecognized options: --nonsense" in done.stderr
+
+
 # signals
 
 

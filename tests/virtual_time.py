@@ -81,21 +81,21 @@ class VirtualPort:
 
     def send(self, data: bytes) -> None:
         """See Port."""
-        self._check()
+        self._refuse_lost()
         self._time.send(data)
 
     def receive(self, timeout: float) -> bytes:
         """See Port."""
-        self._check()
+        self._refuse_lost()
         data = self._time.receive(min(timeout, POLL_TIME))
-        self._check()
+        self._refuse_lost()
         return data
 
     def close(self) -> None:
         """See Port."""
         self._is_open = False
 
-    def _check(self) -> None:
+    def _refuse_lost(self) -> None:
         # a port that returns is another one
         whole = self._time.connected and self._time.cuts == self._cuts
         if not self._is_open or not whole:

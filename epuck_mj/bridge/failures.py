@@ -2,6 +2,12 @@
 
 from epuck_mj.errors import UserError
 
+DONE, FAILED, RUNAWAY = 0, 3, 4
+"""Exit statuses: as planned; broken off, standing still; perhaps still moving.
+
+Beside 2 for what a user can put right before it starts, and 128 + signal.
+"""
+
 
 class BridgeError(UserError):
     """Not what was expected of the robot, or of what it is told.

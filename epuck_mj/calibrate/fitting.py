@@ -77,7 +77,7 @@ def peaks(yaw: np.ndarray, counts: np.ndarray) -> np.ndarray:
     Raises:
         UserError: if readings are too far apart, or a sensor sees something everywhere.
     """
-    _check_floor(np.median(counts, axis=0))
+    _refuse_high_floor(np.median(counts, axis=0))
     first, last = yaw.min() + WINDOW / 2, yaw.max() - WINDOW / 2
     windows = [np.abs(yaw - middle) <= WINDOW / 2 for middle in yaw]
     medians = [
@@ -121,7 +121,7 @@ def fit_gains(clearances: np.ndarray, counts: np.ndarray) -> SensorFit:
     left = np.where(used, logs - fitted, 0.0)
     gains = np.exp(fitted)
     for number, gain in enumerate(gains):
-        _check(f"the gain of ps{number}", float(gain), GAINS, "")
+        _refuse_outside(f"the gain of ps{number}", float(gain), GAINS, "")
     return SensorFit(gains, np.sqrt((left**2).sum(axis=0) / n_used), used)
 
 
@@ -148,19 +148,19 @@ def fit_wheel_radii(
     arc = chord / np.sinc(turn / (2 * np.pi))
     angle = steps * STEP_ANGLE
     wheels = [float(arc + side * turn * track / 2) / angle for side in (-1, 1)]
-    check_wheel_radii(wheels)
-    return wheels[0], wheels[1]
+    return checked_wheel_radii(wheels)
 
 
-def check_wheel_radii(radii: Sequence[float]) -> None:
-    """Nothing, if an e-puck can have wheels of such radii [m].
+def checked_wheel_radii(radii: Sequence[float]) -> tuple[float, float]:
+    """Radii of the left and the right wheel [m] as given, if an e-puck can have them.
 
     Raises:
         UserError: if not.
     """
     for name, radius in zip(SIDES, radii, strict=True):
         what = f"a radius of the {name} wheel"
-        _check(what, 1000 * radius, _millimetres(RADII), " mm")
+        _refuse_outside(what, 1000 * radius, _millimetres(RADII), " mm")
+    return radii[0], radii[1]
 
 
 def fit_track(steps: float, wheel_radius: float, angle: float) -> float:
@@ -177,11 +177,13 @@ def fit_track(steps: float, wheel_radius: float, angle: float) -> float:
     if angle <= 0:
         raise UserError(f"expected a turn to the left, got {math.degrees(angle):.0f}")
     track = 2 * steps * STEP_ANGLE * wheel_radius / angle
-    _check("a track", 1000 * track, _millimetres(TRACKS), " mm")
+    _refuse_outside("a track", 1000 * track, _millimetres(TRACKS), " mm")
     return track
 
 
-def _check(what: str, value: float, limits: tuple[float, float], unit: str) -> None:
+def _refuse_outside(
+    what: str, value: float, limits: tuple[float, float], unit: str
+) -> None:
     low, high = limits
     if not low <= value <= high:
         raise UserError(
@@ -190,7 +192,7 @@ def _check(what: str, value: float, limits: tuple[float, float], unit: str) -> N
         )
 
 
-def _check_floor(floor: np.ndarray) -> None:
+def _refuse_high_floor(floor: np.ndarray) -> None:
     """Refuse sensors that see something where there is nothing."""
     if floor.max() > FLOOR_MAX:
         raise UserError(

@@ -19,7 +19,7 @@ from epuck_mj.calibrate.fitting import (
     SATURATED,
     SIDES,
     SensorFit,
-    check_wheel_radii,
+    checked_wheel_radii,
     fit_gains,
     fit_track,
     fit_wheel_radii,
@@ -147,8 +147,9 @@ def measure_track(bench: Bench, person: Person, known: Calibration) -> Calibrati
     _say(f"track {1000 * track:.2f} mm; before {1000 * known.track:.2f}")
     # on the arc that was measured, wheels farther apart differ by more
     wider = track / known.track
-    radii = tuple(mean + (radius - mean) * wider for radius in known.wheel_radii)
-    check_wheel_radii(radii)
+    radii = checked_wheel_radii(
+        [mean + (radius - mean) * wider for radius in known.wheel_radii]
+    )
     if radii != known.wheel_radii:
         _say_radii(radii, known)
     return replace(known, track=track, wheel_radii=radii)

@@ -82,7 +82,7 @@ def drive_packet(left: int, right: int) -> Request[CommandedSpeeds]:
     expected = CommandedSpeeds(left, right)
 
     def reply(data: bytes) -> CommandedSpeeds:
-        _check_echo(expected, _speeds(data))
+        _refuse_other_speeds(expected, _speeds(data))
         return expected
 
     out = _drive(left, right) + letter_code("E")
@@ -120,7 +120,7 @@ def echoed_cycle_packet(left: int, right: int, changed: bool) -> Request[Cycle]:
     expected = CommandedSpeeds(left, right)
 
     def reply(data: bytes) -> Cycle:
-        _check_echo(expected, _speeds(data[-PAIR.size :]))
+        _refuse_other_speeds(expected, _speeds(data[-PAIR.size :]))
         return _cycle(data[: -PAIR.size])
 
     told = _drive(left, right)
@@ -157,7 +157,7 @@ def _cycle(data: bytes) -> Cycle:
     return Cycle(_proximity(data[: COUNTS.size]), _steps(data[COUNTS.size :]))
 
 
-def _check_echo(expected: CommandedSpeeds, came: CommandedSpeeds) -> None:
+def _refuse_other_speeds(expected: CommandedSpeeds, came: CommandedSpeeds) -> None:
     if came != expected:
         raise BridgeError(
             f"the commanded speeds {expected.left} and {expected.right}",

@@ -126,12 +126,12 @@ class LinesParser(Generic[T]):
             if not self._awaited:
                 self._buffer = b"\n".join([*lines[number + 1 :], self._buffer])
                 return self._reply(self._heard)
-        self._check_length(self._buffer)
+        self._refuse_long(self._buffer)
         return None
 
     def _take(self, line: bytes) -> None:
         awaited = self._awaited[0]
-        self._check_length(line)
+        self._refuse_long(line)
         if BANNER in line and awaited is not GREETING:
             raise RobotRestarted(awaited.what, line)
         if line.endswith(NOT_FOUND + b"\r"):
@@ -144,7 +144,7 @@ class LinesParser(Generic[T]):
         elif self._heard:
             self._heard.append(line)
 
-    def _check_length(self, line: bytes) -> None:
+    def _refuse_long(self, line: bytes) -> None:
         if len(line) > LINE_MAX:
             what = self._awaited[0].what
             raise BridgeError(f"{what}, in a line of at most {LINE_MAX} bytes", line)
