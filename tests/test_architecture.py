@@ -48,6 +48,7 @@ NUMPY_ONLY = (
     "epuck_mj/bridge/fake/builds.py",
     "epuck_mj/bridge/fake/firmware.py",
     "epuck_mj/bridge/fake/motors_and_sensors.py",
+    "epuck_mj/bridge/fake/talker.py",
     "epuck_mj/bridge/fake/wifi_firmware.py",
     "epuck_mj/bridge/fake/wire.py",
     "epuck_mj/calibrate/fitting.py",

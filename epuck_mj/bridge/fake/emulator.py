@@ -1,7 +1,6 @@
 """An e-puck at the other end of a line where things go wrong. Bytes and times only."""
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
@@ -9,28 +8,11 @@ from epuck_mj.bridge.fake.builds import BUILDS
 from epuck_mj.bridge.fake.firmware import Firmware
 from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import GARBAGE_MAX, LOSS, Fault
+from epuck_mj.bridge.fake.talker import Talker
 from epuck_mj.bridge.fake.wifi_firmware import WifiFirmware
 from epuck_mj.bridge.fake.wire import Wire
 from epuck_mj.constants import BYTE_TIME
 from epuck_mj.errors import UserError
-
-
-class Talker(Protocol):
-    """A firmware, of either kind."""
-
-    @property
-    def n_told(self) -> int:
-        """How often it has told its proximity counts since it started."""
-        ...
-
-    def feed(self, data: bytes, now: float) -> None:
-        """Let it hear something."""
-        ...
-
-    def output(self, now: float) -> bytes:
-        """What it has said since the last call."""
-        ...
-
 
 WIFI = "wifi"
 """The e-puck2 behind its radio."""
