@@ -40,7 +40,6 @@ from epuck_mj.constants import (
     WHEEL_RADIUS,
 )
 from epuck_mj.errors import UserError
-from epuck_mj.host.interruption import SIGNALS
 from epuck_mj.rungs.disturbed import DisturbedRobots
 from epuck_mj.rungs.mujoco_batch import SimulatedRobots
 from epuck_mj.scene.mjcf import MODELS
@@ -325,11 +324,6 @@ def changed_robot(folder, radii, track):
     return load_scene(str(path), "arena")
 
 
-@pytest.fixture(scope="module")
-def planar():
-    return load_scene("epuck_planar", "arena")
-
-
 @pytest.fixture
 def output(tmp_path):
     return tmp_path / "robot.yaml"
@@ -448,14 +442,6 @@ def test_the_end_of_the_input(planar, output, part):
 
 
 # what goes wrong on the way
-
-
-@pytest.fixture
-def handlers():
-    before = {signum: signal.getsignal(signum) for signum in SIGNALS}
-    yield before
-    for signum, handler in before.items():
-        signal.signal(signum, handler)
 
 
 @pytest.mark.parametrize("step", list(STEPS))

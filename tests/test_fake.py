@@ -73,11 +73,6 @@ def wait_for(condition, what: str) -> None:
         time.sleep(0.01)
 
 
-@pytest.fixture(scope="module")
-def planar():
-    return load_scene("epuck_planar", "arena")
-
-
 @pytest.fixture(params=["pty", "tcp"])
 def endpoint(request, tmp_path):
     made = Pty(tmp_path / "e-puck") if request.param == "pty" else Tcp(0)

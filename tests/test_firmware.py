@@ -1,7 +1,7 @@
 """The emulated e-puck: its quirks one by one, and the host's language against it."""
 
 import struct
-from itertools import pairwise
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -30,6 +30,7 @@ from epuck_mj.bridge.language.replies import (
     Version,
 )
 from epuck_mj.constants import BYTE_TIME, CALIBRATION_SAMPLES, PROXIMITY_PERIOD
+from tests.test_protocol import pieces
 
 quick = settings(deadline=None, max_examples=60)
 
@@ -97,13 +98,12 @@ class Robot:
         return self.firmware.output(self.now)
 
 
-def ask(robot: Robot, request, cuts=()):
+def ask(robot: Robot, request, cuts: Sequence[int] = ()):
     """The reply to a request, fed in pieces; None if its patience ran out."""
     parser = request.parser()
     came = robot.hear(request.out)
-    places = sorted({0, len(came), *(cut % (len(came) + 1) for cut in cuts)})
-    for a, b in pairwise(places):
-        reply = parser.feed(came[a:b])
+    for piece in pieces(came, cuts):
+        reply = parser.feed(piece)
         if reply is not None:
             return reply
     for _ in range(50):
@@ -181,8 +181,7 @@ ANSWERS = {
 @quick
 def test_answers(heard, said, cuts):
     robot = Robot()
-    places = sorted({0, len(heard), *(cut % (len(heard) + 1) for cut in cuts)})
-    assert b"".join(robot.hear(heard[a:b]) for a, b in pairwise(places)) == said
+    assert b"".join(map(robot.hear, pieces(heard, cuts))) == said
     assert robot.wait(1.0) == b""
 
 

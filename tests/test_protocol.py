@@ -1,6 +1,7 @@
 """The robot's language, byte by byte; the parsers under anything that may come."""
 
 import struct
+from collections.abc import Sequence
 from itertools import pairwise
 
 import pytest
@@ -127,7 +128,7 @@ def outcome(request: Request, chunks):
     return None
 
 
-def pieces(data: bytes, cuts: list[int]) -> list[bytes]:
+def pieces(data: bytes, cuts: Sequence[int]) -> list[bytes]:
     places = sorted({0, len(data), *(cut % (len(data) + 1) for cut in cuts)})
     return [data[a:b] for a, b in pairwise(places)]
 

@@ -42,11 +42,6 @@ AT_WALL = np.array([0.44, 0.0, math.pi / 2])
 FULL = np.full(2, WHEEL_SPEED_MAX)
 
 
-@pytest.fixture(scope="module")
-def planar():
-    return load_scene("epuck_planar", "arena")
-
-
 class World:
     """An emulated robot and a real one on top of it, on one clock."""
 
