@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 import signal
 import subprocess
 import threading
@@ -151,6 +152,17 @@ def test_a_robot_answers_on_its_port(endpoint, planar):
             line.stop()
         finally:
             line.close()
+
+
+def test_the_program_in_the_document(planar, tmp_path, capsys):
+    text = (Path(__file__).parent.parent / "docs" / "bridge.md").read_text()
+    [script] = re.findall(r"^```python\n(.*?)^```", text, re.M | re.S)
+    port = Pty(tmp_path / "e-puck")
+    with living(port, planar) as emulator:
+        exec(script.replace("/tmp/e-puck", port.name), {})
+        assert emulator.body.standing
+    out = capsys.readouterr().out
+    assert re.search(r"^Version 1\.2.*\nSteps\(left=3\d\d, right=-3\d\d\) Prox", out)
 
 
 def test_one_host_after_the_other(endpoint, planar):

@@ -24,7 +24,7 @@ class BridgeError(UserError):
         self.came = came if isinstance(came, str) else _shown(came)
 
     def __str__(self) -> str:
-        """One line."""
+        """What was expected and what came, on one line."""
         return f"expected {self.expected}; came {self.came}"
 
 
@@ -36,7 +36,7 @@ class RobotRestarted(BridgeError):
 
 
 class NoReply(BridgeError):
-    """Nothing, or not enough, came in time."""
+    """The reply did not come in time, or not all of it."""
 
 
 class LinkLost(BridgeError):

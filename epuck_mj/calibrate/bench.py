@@ -29,10 +29,10 @@ A little more than PROXIMITY_PERIOD: more readings would tell the same again.
 """
 
 RATE = 300
-"""Of the wheels where only the way counts [steps/s]."""
+"""Speed of the wheels where only the way counts [steps/s]."""
 
 N_STEPS = 4000
-"""Way straight on: 0.52 m, of which a ruler's millimetre is 0.2 %."""
+"""Steps straight on: 0.52 m, of which a ruler's millimetre is 0.2 %."""
 
 N_TURNS = 3
 """Turns on the spot, of which one degree is 0.1 %."""
@@ -158,7 +158,7 @@ def look_around(
 
 
 def steps_per_turn(calibration: Calibration) -> float:
-    """Of each motor, one forward, one backward."""
+    """Steps of each motor in a turn on the spot, one forward, one backward."""
     return math.pi * calibration.track / (calibration.wheel_radius * STEP_ANGLE)
 
 

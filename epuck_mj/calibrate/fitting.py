@@ -16,13 +16,16 @@ from epuck_mj.step.sensors import proximity
 
 RADII = (0.015, 0.025)
 TRACKS = (0.045, 0.065)
-"""From where to where e-pucks have them [m]. Chosen: 20 % and more beyond any known."""
+"""Radii and tracks that e-pucks can have [m].
+
+Chosen: 20 % and more beyond any known.
+"""
 
 GAINS = (0.2, 5.0)
-"""The same of the sensors' gains. Chosen: known ones are 0.6 to 1.5."""
+"""Gains that sensors can have. Chosen: known ones are 0.6 to 1.5."""
 
 SIDES = ("left", "right")
-"""Of the wheels, in their order."""
+"""The wheels in their order."""
 
 SATURATED = 3700
 """Counts from which a sensor says nothing of the distance.
@@ -40,7 +43,7 @@ The ray is less than 0.1 mm longer at its ends, at a clearance of 30 mm.
 """
 
 N_READINGS = 3
-"""Fewest readings in such a window."""
+"""Fewest readings in a window."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +131,7 @@ def fit_gains(clearances: np.ndarray, counts: np.ndarray) -> SensorFit:
 def fit_wheel_radii(
     steps: float, forward: float, left: float, track: float
 ) -> tuple[float, float]:
-    """On which the robot rolls, left and right [m]: wheels that differ drive an arc.
+    """Radii on which the robot rolls, left and right [m]: if they differ, on an arc.
 
     The front, which is what a person sees, is a body's radius ahead of the axle: if the
     robot turned by `a`, it lies `tan(a / 2) = left / (forward + 2 BODY_RADIUS)` aside.
@@ -136,7 +139,7 @@ def fit_wheel_radii(
     Args:
         steps: that each motor made.
         forward: from where the front was to where it is, straight on [m].
-        left: the same to the left of straight on [m].
+        left: how far its front is to the left of straight on [m].
         track: effective distance of the wheels [m].
 
     Raises:

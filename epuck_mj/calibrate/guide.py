@@ -32,26 +32,26 @@ from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.motors import STEP_ANGLE
 
 CLEARANCES = (0.010, 0.020, 0.030)
-"""Between shell and wall [m]: where sensors are good, and do not saturate."""
+"""Clearances from shell to wall [m], where sensors are good, and do not saturate."""
 
 RESIDUAL_MAX = 0.25
-"""A sensor that deviates more from the curve is worth a word. Chosen."""
+"""Residual above which a sensor is worth a word. Chosen."""
 
 LENGTHS = (0.05, 2.0)
-"""What a ruler can have shown [m]; others are taken for slips of the pen."""
+"""Ways that a ruler can have shown [m]; others are taken for slips of the pen."""
 
 DRIFTS = (-150.0, 150.0)
-"""The same to the left [mm]: wheels that differ by 5 %."""
+"""Ways to the left that a ruler can have shown [mm]: wheels that differ by 5 %."""
 
 MISSES = (-360.0, 360.0)
-"""The same of a protractor [degrees]."""
+"""Angles that a protractor can have shown [degrees]."""
 
 
 class Person:
     """Who is at the robot."""
 
     def __init__(self, ask: Callable[[str], str], interruption: Interruption) -> None:
-        """Nothing is asked yet.
+        """A person who was asked nothing yet.
 
         Args:
             ask: shows a question and gives the answer, as `input` does.
@@ -69,7 +69,7 @@ class Person:
         self._answer(f"{what}\nThen press Enter: ")
 
     def agrees(self, question: str) -> bool:
-        """Yes or no.
+        """Whether the person says yes; asked again until it is yes or no.
 
         Raises:
             UserError: if nobody answers any more.
@@ -112,7 +112,7 @@ class Person:
 def measure_wheel_radii(
     bench: Bench, person: Person, known: Calibration
 ) -> Calibration:
-    """With the wheel radii by a ruler."""
+    """What is known, with the wheel radii by a ruler."""
     step_length = STEP_ANGLE * known.wheel_radius
     _say("\nWheel radii: the robot drives straight on, you measure where it gets.")
     clear = N_STEPS * step_length + 0.15
@@ -131,7 +131,7 @@ def measure_wheel_radii(
 
 
 def measure_track(bench: Bench, person: Person, known: Calibration) -> Calibration:
-    """With the track by a protractor."""
+    """What is known, with the track by a protractor."""
     _say(
         f"\nTrack: the robot turns {N_TURNS} times to the left, on the spot;\n"
         "you measure by how much its front misses where it was."
@@ -156,7 +156,7 @@ def measure_track(bench: Bench, person: Person, known: Calibration) -> Calibrati
 
 
 def measure_gains(bench: Bench, person: Person, known: Calibration) -> Calibration:
-    """With the gains of the proximity sensors."""
+    """What is known, with the gains of the proximity sensors."""
     _say("\nSensors: the robot turns slowly on the spot, at several distances")
     _say("from a flat wall which is 20 cm long or longer.")
     if person.agrees("Set the sensors' zero? They forget it when switched off"):
@@ -220,4 +220,4 @@ STEPS = {
     "turn": measure_track,
     "sensors": measure_gains,
 }
-"""In the order in which each is of use to the next."""
+"""The steps of a calibration, in the order in which each is of use to the next."""

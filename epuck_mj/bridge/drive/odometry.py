@@ -24,7 +24,7 @@ class Odometry:
     """
 
     def __init__(self, calibration: Calibration, start: np.ndarray) -> None:
-        """At rest.
+        """A robot at rest where it starts.
 
         Args:
             calibration: the robot's wheel radii and track.

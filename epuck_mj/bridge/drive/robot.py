@@ -71,7 +71,7 @@ class RealRobot:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Nothing is sent yet.
+        """Take a connection, on which nothing is sent yet.
 
         Args:
             connection: how to reach it.
@@ -102,7 +102,7 @@ class RealRobot:
         return self._connection.n_repairs
 
     def __enter__(self) -> Self:
-        """Itself; nothing is sent yet."""
+        """The robot itself; nothing is sent yet."""
         return self
 
     def __exit__(

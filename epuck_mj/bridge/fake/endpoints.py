@@ -22,6 +22,7 @@ IDLE_TIME, BUSY_TIME = 0.004, 0.0005
 """How long it sleeps when nothing, or something, is under way [s]."""
 
 HEARD_MAX = 4096
+"""Most bytes heard at once."""
 
 
 class Endpoint(Protocol):
@@ -35,7 +36,7 @@ class Endpoint(Protocol):
 
     @property
     def name(self) -> str:
-        """By which a host opens it."""
+        """Name by which a host opens it."""
         ...
 
     def open(self) -> None:

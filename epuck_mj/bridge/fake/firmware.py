@@ -207,7 +207,7 @@ class Firmware(Talker):
                 self.leds[number] = {0: 0, 1: 1, 2: 1 - was}.get(value, was)
 
     def _two_operands(self, line: bytes) -> tuple[int, int]:
-        """Of a line as C's `sscanf` reads them into 16 bits."""
+        """Operands of a line, as C's `sscanf` reads them into 16 bits."""
         letter = chr(line[0]).upper()
         found = re.match(
             rb".,\s*([+-]?\d{1,9})(?:,\s*([+-]?\d{1,9}))?", line, re.DOTALL

@@ -31,7 +31,7 @@ from epuck_mj.constants import (
 )
 
 TIMER = MotorTimer(STEP_RATE_MAX, MOTOR_TICK_RATE_2, saves_current=False)
-"""Its motors, behind a radio that accepts less than the main processor does."""
+"""Motors behind a radio that accepts less than the main processor does."""
 
 
 class WifiFirmware(Talker):

@@ -35,7 +35,7 @@ from epuck_mj.constants import (
 )
 
 ALL_LEDS = N_LEDS
-"""In the place of an LED's number: all of the ring."""
+"""Number that stands for all LEDs of the ring."""
 
 LED_OFF, LED_ON, LED_TOGGLED = range(3)
 """What an LED can be told."""

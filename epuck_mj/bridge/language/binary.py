@@ -36,7 +36,7 @@ COUNTS = struct.Struct(f"<{N_PROXIMITY}h")
 """Proximity or ambient light counts."""
 
 PAIR = struct.Struct("<2h")
-"""Left and right."""
+"""Values of the left and the right wheel."""
 
 
 def letter_code(letter: str) -> bytes:

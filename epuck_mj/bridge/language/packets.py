@@ -64,7 +64,7 @@ class PacketParser:
     """Cuts what comes from an e-puck2 into packets; good for one connection."""
 
     def __init__(self) -> None:
-        """Nothing came yet."""
+        """A parser to which nothing came yet."""
         self._buffer = b""
 
     def feed(self, data: bytes) -> list[Sensors]:

@@ -100,7 +100,7 @@ class LinesParser(Generic[T]):
     def __init__(
         self, lines: tuple[Line, ...], reply: Callable[[list[bytes]], T]
     ) -> None:
-        """For lines to come, and what makes the reply of them.
+        """Parse lines to come, and make a reply of them.
 
         Args:
             lines: in the order in which they come.
@@ -157,7 +157,7 @@ class BytesParser(Generic[T]):
     """
 
     def __init__(self, what: str, length: int, reply: Callable[[bytes], T]) -> None:
-        """For a number of bytes, and what makes the reply of them.
+        """Parse a number of bytes, and make a reply of them.
 
         Args:
             what: the reply, for a person.
@@ -172,7 +172,7 @@ class BytesParser(Generic[T]):
 
     @property
     def rest(self) -> bytes:
-        """Always nothing: bytes after the reply raise."""
+        """No bytes, ever: those after the reply raise."""
         return b""
 
     def feed(self, data: bytes) -> T | None:

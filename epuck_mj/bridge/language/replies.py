@@ -40,7 +40,7 @@ class Battery:
     state: str
 
     def __str__(self) -> str:
-        """For a person."""
+        """The state in words for a person."""
         return {"0": "low", "1": "good"}.get(self.state, self.state)
 
 
@@ -170,5 +170,5 @@ def _refuse_long_words(name: str, values: tuple[int, ...]) -> None:
 
 
 def wrapped(count: int) -> int:
-    """As a signed integer of 16 bits."""
+    """The count as a signed integer of 16 bits."""
     return (count + 2**15) % 2**16 - 2**15

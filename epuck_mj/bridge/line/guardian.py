@@ -17,14 +17,13 @@ import time
 from collections.abc import Callable
 
 N_FAREWELLS, FAREWELL_PERIOD = 5, 0.2
-"""How often it says so, and the time in between [s]: bytes may be lost."""
+"""Farewells said, and the time between two [s]: bytes may be lost."""
 
 DISMISSED = b"."
 """What a bridge says that needs no guardian any more."""
 
-
 DISMISSAL_TIME_MAX = 2.0
-"""A guardian that does not go by then is killed [s]. Chosen."""
+"""A dismissed guardian that takes longer to go is killed [s]. Chosen."""
 
 
 def hire(fileno: Callable[[], int], farewell: bytes) -> subprocess.Popen | None:

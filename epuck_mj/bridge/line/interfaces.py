@@ -52,8 +52,8 @@ class Connection(Protocol):
         """What it senses now.
 
         Args:
-            left: wheel speed [steps/s] that it drives at, or has to if it `changed`.
-            right: likewise.
+            left: speed [steps/s] of the left wheel, new if it `changed`.
+            right: speed [steps/s] of the right wheel.
             changed: whether the robot has to be told.
             until: when to give up, by the clock.
         """

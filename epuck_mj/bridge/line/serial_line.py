@@ -14,14 +14,14 @@ from epuck_mj.constants import CONNECT_TIME_MAX, STOP_REPLY_TIME, STOP_TIME_MAX
 
 
 class SerialLine:
-    """See Connection.
+    """A connection over a serial line.
 
     Attributes:
         n_repairs: how often a resynchronisation was needed.
     """
 
     def __init__(self, link: Link) -> None:
-        """On a link that is open."""
+        """Take a link that is open."""
         self._link = link
         self._busy_until = 0.0
         self.n_repairs = 0
@@ -52,7 +52,7 @@ class SerialLine:
         return Greeting(", ".join(version.lines), battery)
 
     def cycle(self, left: int, right: int, changed: bool, until: float) -> Cycle:
-        """See Connection; out of step, the two find each other again until then.
+        """See Connection; while out of step, host and robot find each other again.
 
         Raises:
             BridgeError: if they did not; names what was wrong first.

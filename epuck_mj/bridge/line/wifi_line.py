@@ -29,7 +29,7 @@ A wheel slower than 10 steps/s, 1.3 mm/s, is not noticed.
 
 
 class WifiLine:
-    """See Connection.
+    """A connection to an e-puck2 over WiFi.
 
     Attributes:
         n_repairs: none: TCP loses no byte, and what is no packet ends the drive.
