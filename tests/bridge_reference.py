@@ -22,7 +22,7 @@ from epuck_mj.step.disturbances import Noise, draw
 from epuck_mj.step.motors import STEP_ANGLE, command, step_rates
 from epuck_mj.step.sensors import observe, proximity, sensed_distance
 
-EXACT = Noise(counts=0.0, wheels=0.0, age=0.0)
+QUIET = Noise(counts=0.0, wheels=0.0, age=0.0)
 """Whole counts and whole steps, and nothing else."""
 
 
@@ -103,7 +103,7 @@ def nominal(
         start: pose `(3,)`: x, y [m], yaw [rad].
         n_steps: control steps.
     """
-    met = draw(np.random.default_rng(0), 1, n_steps, EXACT)
+    met = draw(np.random.default_rng(0), 1, n_steps, QUIET)
     robots = DisturbedRobots(SimulatedRobots(scene, 1, 1), met, task.control_step)
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     poses = [robots.poses()[0]]
