@@ -18,6 +18,7 @@ from epuck_mj.check.walls import seen_by_rays
 from epuck_mj.errors import UserError
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.scene.robot_parts import ROBOT_BODY
+from tests.processes import PATIENCE
 
 ROBOTS = ("epuck", "epuck_planar")
 SHIPPED = [path.stem for path in sorted(MODELS.glob("arenas/*.xml"))] + ["arena"]
@@ -471,7 +472,7 @@ def test_bad_command_lines_are_one_line_and_status_2(tmp_path):
             [sys.executable, "-m", "epuck_mj.check", *map(str, arguments)],
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=PATIENCE,
             cwd=MODELS.parent,
         )
         assert result.returncode == 2

@@ -43,6 +43,7 @@ from evolution.statistics.comparisons import holm
 from evolution.statistics.samples import rank_correlation
 from evolution.study.config import seeds_text
 from evolution.study.data import load_study
+from tests.processes import PATIENCE
 from tests.study_on_disk import LEVELS, ROBOTS, history, write_study
 
 NAMES = tuple(LEVELS)
@@ -503,7 +504,7 @@ def test_bad_input_is_one_line(kind, tmp_path):
         [sys.executable, "-m", "evolution.report", str(path), *argv],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
     )
     assert result.returncode == 2
     assert result.stdout == ""

@@ -22,6 +22,7 @@ from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import TaskParameters, drive
 from epuck_mj.trials.recorder import record
+from tests.processes import PATIENCE
 
 TASK = TaskParameters(steps=120)
 
@@ -130,7 +131,7 @@ def run(*arguments, **environment):
         [sys.executable, "-m", "epuck_mj.view", *map(str, arguments)],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
         cwd=MODELS.parent,
         env={**os.environ, "DISPLAY": "", "WAYLAND_DISPLAY": "", **environment},
     )
@@ -216,7 +217,7 @@ def test_a_window_opens_shows_the_robot_and_closes(display, champion):
         [sys.executable, "-c", WINDOW, "arena", str(champion), "--seconds", "0.1"],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
         cwd=MODELS.parent,
         env={**os.environ, "DISPLAY": display},
     )
@@ -242,7 +243,7 @@ def test_ctrl_c_ends_it_without_a_word(display):
     assert process.stdout is not None
     line = process.stdout.readline()
     process.send_signal(2)
-    _, errors = process.communicate(timeout=30)
+    _, errors = process.communicate(timeout=PATIENCE)
     if "cannot open a window" in errors:
         pytest.skip(f"no OpenGL on Xvfb: {errors}")
     assert line.startswith("trial 1: ")
