@@ -14,7 +14,6 @@ from epuck_mj.host.command_line import check_threads, main, parse
 from epuck_mj.policies.wall_follower import YARDSTICK
 from epuck_mj.step.conditions import Conditions, NoiseLevel
 from epuck_mj.step.disturbances import Disturbances
-from evolution.judging.held_out import Judges, tested_on
 from evolution.judging.scores import HeldOut
 from evolution.judging.starts import N_TEST, held_out_disturbances
 from evolution.named_policies import named_policies
@@ -81,6 +80,9 @@ def evaluate(argv: Sequence[str]) -> int:
     conditions = Conditions.asked(*asked) or Conditions()
     if options.json is not None:
         files.check_writable(options.json)
+    # simulators are for a command that makes sense
+    from evolution.judging.held_out import Judges, tested_on
+
     judges = Judges(options.threads)
 
     @cache

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import tyro
 
@@ -17,7 +18,6 @@ from epuck_mj.host import files
 from epuck_mj.host.command_line import check_threads, main, parse
 from epuck_mj.policies import file as controller_file
 from epuck_mj.policies.file import ControllerFile
-from evolution.judging.held_out import Judges
 from evolution.judging.scores import Scores
 from evolution.judging.starts import held_out_disturbances
 from evolution.run.directory import RunDirectory
@@ -25,6 +25,9 @@ from evolution.run.provenance import processor
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.randomness import Purpose
 from evolution.study.directory import champions
+
+if TYPE_CHECKING:
+    from evolution.judging.held_out import Judges
 
 MODULE = "evolution.verify"
 
@@ -55,6 +58,9 @@ def verify(argv: Sequence[str]) -> int:
     runs = [run for path in options.paths for run in _runs(path)]
     if not runs:
         raise UserError("expected run or study directories")
+    # simulators are for a command that makes sense
+    from evolution.judging.held_out import Judges
+
     judges = Judges(options.threads)
     same = [_verified(run, judges) for run in runs]
     print(f"{sum(same)} of {len(same)} champions score the same to the last bit")
@@ -76,7 +82,7 @@ def _runs(path: Path) -> list[RunDirectory]:
     return [RunDirectory(champion.parent) for champion in found]
 
 
-def _verified(run: RunDirectory, judges: Judges) -> bool:
+def _verified(run: RunDirectory, judges: "Judges") -> bool:
     """Whether all scores are the same; says so, or what differs."""
     config, champion = run.stored_config(), controller_file.load(run.champion)
     scores = Scores.read(champion.scores, run.champion)
@@ -100,7 +106,7 @@ def _differing(
     champion: ControllerFile,
     scores: Scores,
     config: ExperimentConfig,
-    judges: Judges,
+    judges: "Judges",
 ) -> Iterator[str]:
     """What of the champion's held-out evaluations is not what is written."""
     for tests in (scores.held_out, scores.held_out_as_evolved):
@@ -130,7 +136,7 @@ def _most_believed(
     run: RunDirectory,
     scores: Scores,
     config: ExperimentConfig,
-    judges: Judges,
+    judges: "Judges",
 ) -> Iterator[str]:
     """Whether the individual with the highest stored fitness has another fitness."""
     written = scores.most_believed
@@ -150,7 +156,7 @@ def _most_believed(
 def _edited(
     champion: ControllerFile,
     config: ExperimentConfig,
-    judges: Judges,
+    judges: "Judges",
 ) -> Iterator[str]:
     """Whether robot or arena have been edited since."""
     now = dict(judges.of(config.robot, config.setting).scene.sha256)

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from epuck_mj.check import check_arena, report
+from epuck_mj.check import report
 from epuck_mj.check.__main__ import run
+from epuck_mj.check.arena import check_arena
 from epuck_mj.check.findings import Severity
 from epuck_mj.check.source import read
 from epuck_mj.check.walls import seen_by_rays

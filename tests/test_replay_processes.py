@@ -21,7 +21,7 @@ from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.policies.network import Network
 from epuck_mj.show import render
 from epuck_mj.step.control import TaskParameters
-from evolution.replay import __main__ as command
+from evolution.replay import output
 from evolution.replay.__main__ import replay
 from tests.browser import until
 from tests.processes import PATIENCE
@@ -230,8 +230,8 @@ def test_a_picture(here):
 @needs_opengl
 def test_a_video_and_everything_else_at_once(here, monkeypatch, capsys):
     pytest.importorskip("imageio_ffmpeg", reason="the extra 'video' is not installed")
-    monkeypatch.setattr(command, "VIDEO_SIZE", (96, 64))
-    monkeypatch.setattr(command, "IMAGE_SIZE", (96, 64))
+    monkeypatch.setattr(output, "VIDEO_SIZE", (96, 64))
+    monkeypatch.setattr(output, "IMAGE_SIZE", (96, 64))
     everything = ("--save", "a.rrd", "--image", "a.png", "--video", "films/a.mp4")
     assert replay(["champion.json", *everything]) == 0
     said = capsys.readouterr()

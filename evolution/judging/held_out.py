@@ -10,6 +10,7 @@ import numpy as np
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.model_files import PLANAR_ROBOT, WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.scene.wall_loops import wall_loops
 from epuck_mj.step.control import Everybody, Policy, TaskParameters
@@ -22,10 +23,6 @@ from evolution.judging.scores import HeldOut
 from evolution.judging.starts import N_TEST, starts_for_test
 from evolution.settings.setting import Setting
 from evolution.statistics.samples import mean_interval, worst_share_mean
-
-WHEELED_ROBOT, PLANAR_ROBOT = "epuck", "epuck_planar"
-"""Every champion is reported on the first, whatever it was evolved on, and what was
-evolved on it on the second as well."""
 
 INTERVAL_SEED = 0
 """Of the bootstrap's resamples, so that the same trials give the same interval."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from epuck_mj.errors import UserError
-from evolution.judging.held_out import WHEELED_ROBOT
+from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.report.samples import TARGET_SHARES, hits
 from evolution.run.directory import RunDirectory
 from evolution.statistics.targets import expected_running_time_interval

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evolution.judging.held_out import WHEELED_ROBOT
+from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.pages.words import PAPERS, label, median_and_quartiles
 from evolution.report.pairs import PairRow, numbers, pairs_of
 from evolution.report.samples import FOLLOWING, known

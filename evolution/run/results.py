@@ -8,10 +8,11 @@ from epuck_mj.host import files
 from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.policies.network import Controller
 from epuck_mj.scene.model import Scene
+from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.trials.recorder import record_trajectories
 from evolution.judging.evaluation import BatchEngine
-from evolution.judging.held_out import WHEELED_ROBOT, Judge
+from evolution.judging.held_out import Judge
 from evolution.judging.scores import Believed, Scores
 from evolution.judging.starts import N_TEST, held_out_disturbances
 from evolution.run.champion import Champion, choose_champion, most_believed
