@@ -97,10 +97,7 @@ def _verified(run: RunDirectory, judge: Judging) -> bool:
 
 
 def _differing(
-    champion: ControllerFile,
-    scores: Scores,
-    config: ExperimentConfig,
-    judge: Judging,
+    champion: ControllerFile, scores: Scores, config: ExperimentConfig, judge: Judging
 ) -> Iterator[str]:
     """What of the champion's held-out evaluations is not what is written."""
     for tests in (scores.held_out, scores.held_out_as_evolved):
@@ -127,10 +124,7 @@ def _differing(
 
 
 def _most_believed(
-    run: RunDirectory,
-    scores: Scores,
-    config: ExperimentConfig,
-    judge: Judging,
+    run: RunDirectory, scores: Scores, config: ExperimentConfig, judge: Judging
 ) -> Iterator[str]:
     """Whether the individual with the highest stored fitness has another fitness."""
     written = scores.most_believed
