@@ -152,12 +152,12 @@ class KnownScores(Scores, frozen=True):
     @classmethod
     def found_in(cls, fields: Mapping[str, Any]) -> Self:
         """Scores of a file that anybody may have made; what is none is left out."""
-        try:
-            return cls.model_validate(fields)
-        except ValidationError as error:
-            key, *inside = map(str, error.errors()[0]["loc"])
-        rest = {name: value for name, value in fields.items() if name != key}
-        if key == "held_out" and inside:
-            tests = fields[key].items()
-            rest[key] = {robot: test for robot, test in tests if robot != inside[0]}
-        return cls.found_in(rest)
+        sound = dict(fields)
+        while True:
+            try:
+                return cls.model_validate(sound)
+            except ValidationError as error:
+                key, *inside = map(str, error.errors()[0]["loc"])
+            tests = sound.pop(key)
+            if key == "held_out" and inside:
+                sound[key] = {name: tests[name] for name in tests if name != inside[0]}

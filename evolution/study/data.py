@@ -44,7 +44,7 @@ class RunData:
         return self.scores.held_out[robot].mean
 
     def held_out_as_evolved(self, robot: str) -> float:
-        """The same with the disturbances it evolved with; nan if not tested so."""
+        """The champion's mean with disturbances as it evolved; nan if not tested so."""
         test = self.scores.held_out_as_evolved.get(robot)
         return math.nan if test is None else test.mean
 
