@@ -1,7 +1,7 @@
 """The bridge against the emulated robot, in real time on a pty: `make bridge`.
 
 The emulator is a process of its own, the bridge this one; pyserial lies between them.
-Its closed loop is compared with two simulations, see `epuck_mj.bridge.fake.reference`:
+Its closed loop is compared with two simulations, see `tests.bridge_reference`:
 one at the same times, which shows that nothing is lost or changed on the way, and one
 with control steps all alike, which shows what a real robot's timing does to a path.
 """
@@ -22,7 +22,6 @@ from epuck_mj.bridge.drive.robot import RealRobot
 from epuck_mj.bridge.drive.session import Session
 from epuck_mj.bridge.fake.builds import BUILDS
 from epuck_mj.bridge.fake.mujoco_body import Journal
-from epuck_mj.bridge.fake.reference import deviation, nominal, same_times
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.bridge.line.serial_port import SerialPort
@@ -32,6 +31,13 @@ from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import Policy, TaskParameters
+from tests.bridge_reference import (
+    at_control_steps,
+    deviation,
+    drive_steps,
+    nominal,
+    same_times,
+)
 
 ROBOTS = ("epuck", "epuck_planar")
 FIRMWARE = "asercom"
@@ -138,24 +144,12 @@ def read_journal(path: Path) -> Journal:
     )
 
 
-def at_control_steps(scene: Scene, journal: Journal, n_steps: int) -> np.ndarray:
-    """Poses `(n, 3)` from the first command on, a control step apart."""
-    driven = [
-        step
-        for step, row in zip(journal.command_step, journal.command, strict=True)
-        if row[0] or row[2]
-    ]
-    poses = np.array(journal.pose)[driven[0] :: scene.n_substeps]
-    return poses[: n_steps + 1]
-
-
 def off_beat(scene: Scene, journal: Journal) -> int:
     """Commands that did not come whole control steps after the one before.
 
     In physics steps: one early or late is enough to make another path of it.
     """
-    rows = zip(journal.command_step, journal.command, strict=True)
-    driven = [step for step, row in rows if row[0] or row[2]]
+    driven = drive_steps(journal)
     return int(np.count_nonzero(np.diff(driven) % scene.n_substeps))
 
 

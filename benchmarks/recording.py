@@ -17,10 +17,10 @@ from pathlib import Path
 from epuck_mj.host.command_line import main, parse
 from epuck_mj.host.files import write_text
 from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.show.recording import Trial, save_recording
 from epuck_mj.trials.recorder import record
-from evolution.judging.held_out import WHEELED_ROBOT
 from evolution.judging.starts import starts_for_test
 from evolution.named_policies import named_policies
 

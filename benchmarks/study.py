@@ -19,7 +19,7 @@ from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse
 from evolution.judging.evaluation import BatchEngine
 from evolution.judging.held_out import Judge
-from evolution.run.execution import Means
+from evolution.run.means import Means
 from evolution.settings.config_files import find_config, load_config
 from evolution.study.jobs import Job, carry_out, carry_out_side_by_side
 

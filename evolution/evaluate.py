@@ -14,7 +14,7 @@ from epuck_mj.host.command_line import check_threads, main, parse
 from epuck_mj.policies.wall_follower import YARDSTICK
 from epuck_mj.step.conditions import Conditions, NoiseLevel
 from epuck_mj.step.disturbances import Disturbances
-from evolution.judging.held_out import HeldOut, judging, tested_on
+from evolution.judging.scores import HeldOut
 from evolution.judging.starts import N_TEST, held_out_disturbances
 from evolution.named_policies import named_policies
 from evolution.settings.randomness import Purpose
@@ -80,7 +80,10 @@ def evaluate(argv: Sequence[str]) -> int:
     conditions = Conditions.asked(*asked) or Conditions()
     if options.json is not None:
         files.check_writable(options.json)
-    judge = judging(options.threads)
+    # simulators are for a command that makes sense
+    from evolution.judging.held_out import Judges, tested_on
+
+    judges = Judges(options.threads)
 
     @cache
     def met(steps: int) -> Disturbances | None:
@@ -93,7 +96,7 @@ def evaluate(argv: Sequence[str]) -> int:
         setting = Setting(arena, candidate.task, candidate.start_clearance)
         for robot in robots:
             steps = candidate.task.steps
-            test = judge(robot, setting).test(
+            test = judges.of(robot, setting).test(
                 candidate.policy, options.starts, met(steps)
             )
             print(f"{candidate.name}, {Path(robot).name} in {Path(arena).name}")
@@ -103,7 +106,7 @@ def evaluate(argv: Sequence[str]) -> int:
                 "robot": robot,
                 "arena": arena,
             }
-            tests.append(where | asdict(conditions) | asdict(test))
+            tests.append(where | asdict(conditions) | test.to_dict())
     if options.json is not None:
         with files.writing():
             files.write_text(options.json, json.dumps(tests, indent=1) + "\n")

@@ -4,9 +4,10 @@ What can be evaluated and replayed: champions, the best individuals of past gene
 and the follower written by hand.
 """
 
+import math
 import re
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from epuck_mj.policies import file as controller_file
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import START_CLEARANCE, Policy, TaskParameters
+from evolution.judging.scores import KnownScores
 from evolution.run.directory import RunDirectory
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import load_config
@@ -37,7 +39,7 @@ class NamedPolicy:
         robot: that it was evolved on.
         arena: that it was evolved in.
         start_clearance: least distance from the shell to a wall at its starts [m].
-        scores: what is known of its worth, as in a controller file.
+        scores: what is known of its worth.
         config: of its run, if that is known.
         variant: which of the source's policies it is, if there are more.
     """
@@ -48,7 +50,7 @@ class NamedPolicy:
     robot: str = "epuck_planar"
     arena: str = "arena"
     start_clearance: float = START_CLEARANCE
-    scores: dict | None = None
+    scores: KnownScores = field(default_factory=KnownScores)
     config: ExperimentConfig | None = None
     variant: str = ""
 
@@ -111,7 +113,7 @@ def _champion(path: Path, name: str, config: ExperimentConfig | None) -> NamedPo
         file.origin.robot,
         file.origin.arena,
         clearance,
-        file.scores,
+        KnownScores.found_in(file.scores),
         config,
     )
 
@@ -143,7 +145,7 @@ def _best_individuals(run: RunDirectory, generations: str) -> list[NamedPolicy]:
             config.robot,
             config.arena,
             config.start_clearance,
-            {"stored": float(fitness[generation])},
+            KnownScores(stored=float(fitness[generation])),
             config,
             f"generation {generation}",
         )
@@ -169,7 +171,7 @@ def _number(word: str) -> int | None:
 
 def described(policy: NamedPolicy) -> str:
     """What is known of a policy, as Markdown."""
-    lines = [f"## {policy.name}", "", *_scores(policy.scores or {}), ""]
+    lines = [f"## {policy.name}", "", *_scores(policy.scores), ""]
     config = policy.config
     settings = config.to_yaml() if config else _plain(policy)
     return "\n".join([*lines, "```", settings.rstrip(), "```", ""])
@@ -180,20 +182,16 @@ def _plain(policy: NamedPolicy) -> str:
     return "\n".join(f"{key}: {value}" for key, value in fields.items())
 
 
-def _scores(scores: dict) -> Iterator[str]:
+def _scores(scores: KnownScores) -> Iterator[str]:
     """A line per score; of unknown ones nothing."""
-    for key, title in (
-        ("stored", "Stored fitness, what evolution believed"),
-        ("validation", "On validation starts, where the champion was chosen"),
+    for fitness, title in (
+        (scores.stored, "Stored fitness, what evolution believed"),
+        (scores.validation, "On validation starts, where the champion was chosen"),
     ):
-        if isinstance(scores.get(key), int | float):
-            yield f"- {title}: {scores[key]:.1f}"
-    held_out = scores.get("held_out")
-    for robot, test in held_out.items() if isinstance(held_out, dict) else ():
-        try:
-            yield (
-                f"- Held-out fitness, {robot}: {test['mean']:.1f} over "
-                f"{test['starts']:,} starts, {test['crash_rate']:.1%} crash"
-            )
-        except (KeyError, TypeError, ValueError):
-            continue
+        if not math.isnan(fitness):
+            yield f"- {title}: {fitness:.1f}"
+    for robot, test in scores.held_out.items():
+        yield (
+            f"- Held-out fitness, {robot}: {test.mean:.1f} over {test.starts:,} "
+            f"starts, {test.crash_rate:.1%} crash"
+        )

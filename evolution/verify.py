@@ -4,12 +4,12 @@ MuJoCo gives the same bits for one version on one type of processor only. Where 
 fitness differs, what else differs is named.
 """
 
-import json
 import platform
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import tyro
 
@@ -18,14 +18,16 @@ from epuck_mj.host import files
 from epuck_mj.host.command_line import check_threads, main, parse
 from epuck_mj.policies import file as controller_file
 from epuck_mj.policies.file import ControllerFile
-from evolution.judging.held_out import Judging, judging
+from evolution.judging.scores import Scores
 from evolution.judging.starts import held_out_disturbances
 from evolution.run.directory import RunDirectory
 from evolution.run.provenance import processor
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.randomness import Purpose
-from evolution.study.data import check_scores
 from evolution.study.directory import champions
+
+if TYPE_CHECKING:
+    from evolution.judging.held_out import Judges
 
 MODULE = "evolution.verify"
 
@@ -56,8 +58,11 @@ def verify(argv: Sequence[str]) -> int:
     runs = [run for path in options.paths for run in _runs(path)]
     if not runs:
         raise UserError("expected run or study directories")
-    judge = judging(options.threads)
-    same = [_verified(run, judge) for run in runs]
+    # simulators are for a command that makes sense
+    from evolution.judging.held_out import Judges
+
+    judges = Judges(options.threads)
+    same = [_verified(run, judges) for run in runs]
     print(f"{sum(same)} of {len(same)} champions score the same to the last bit")
     return 0 if all(same) else 1
 
@@ -77,14 +82,14 @@ def _runs(path: Path) -> list[RunDirectory]:
     return [RunDirectory(champion.parent) for champion in found]
 
 
-def _verified(run: RunDirectory, judge: Judging) -> bool:
+def _verified(run: RunDirectory, judges: "Judges") -> bool:
     """Whether all scores are the same; says so, or what differs."""
     config, champion = run.stored_config(), controller_file.load(run.champion)
-    check_scores(champion.scores, run.champion)
+    scores = Scores.read(champion.scores, run.champion)
     differing = [
-        *_differing(champion, config, judge),
-        *_most_believed(run, champion, config, judge),
-        *_edited(champion, config, judge),
+        *_differing(champion, scores, config, judges),
+        *_most_believed(run, scores, config, judges),
+        *_edited(champion, config, judges),
     ]
     if differing:
         causes = _changes(run.provenance_fields())
@@ -99,43 +104,43 @@ def _verified(run: RunDirectory, judge: Judging) -> bool:
 
 def _differing(
     champion: ControllerFile,
+    scores: Scores,
     config: ExperimentConfig,
-    judge: Judging,
+    judges: "Judges",
 ) -> Iterator[str]:
     """What of the champion's held-out evaluations is not what is written."""
-    for kind in ("held_out", "held_out_as_evolved"):
-        for robot, written in champion.scores.get(kind, {}).items():
-            n, met, where = written["starts"], None, robot
-            if kind == "held_out_as_evolved":
+    for tests in (scores.held_out, scores.held_out_as_evolved):
+        for robot, written in tests.items():
+            n, met, where = written.starts, None, robot
+            if tests is scores.held_out_as_evolved:
                 met = held_out_disturbances(
                     config.conditions, Purpose.TEST, n, config.steps
                 )
                 where = f"{robot} as evolved on"
             # its own robot may be a file
             named = config.robot if Path(config.robot).name == robot else robot
-            test = judge(named, config.setting).test(champion.controller, n, met)
-            # as it is read back
-            again = json.loads(json.dumps(asdict(test)))
-            if again["mean"] != written["mean"]:
+            test = judges.of(named, config.setting).test(champion.controller, n, met)
+            before, now = written.to_dict(), test.to_dict()
+            if test.mean != written.mean:
                 low, high = test.interval
                 yield (
-                    f"{where} {written['mean']!r} is now {test.mean!r} "
-                    f"({test.mean - written['mean']:+.3g}, 95 % CI {low:.1f} to "
+                    f"{where} {written.mean!r} is now {test.mean!r} "
+                    f"({test.mean - written.mean:+.3g}, 95 % CI {low:.1f} to "
                     f"{high:.1f})"
                 )
-            elif others := [key for key in written if again.get(key) != written[key]]:
+            elif others := [key for key in before if now[key] != before[key]]:
                 yield f"{where}, the same mean, but other {', '.join(others)}"
 
 
 def _most_believed(
     run: RunDirectory,
-    champion: ControllerFile,
+    scores: Scores,
     config: ExperimentConfig,
-    judge: Judging,
+    judges: "Judges",
 ) -> Iterator[str]:
     """Whether the individual with the highest stored fitness has another fitness."""
-    written = champion.scores.get("most_believed")
-    if not written or not files.is_file(run.best_individuals):
+    written = scores.most_believed
+    if written is None or not files.is_file(run.best_individuals):
         return
     best = files.read_arrays(run.best_individuals)
     try:
@@ -143,18 +148,18 @@ def _most_believed(
         policy = config.network.decode(genome)
     except (KeyError, ValueError, IndexError) as error:
         raise UserError(f"'{run.best_individuals}' is damaged: {error}") from None
-    mean = judge(config.robot, config.setting).test(policy).mean
-    if mean != written["held_out"]:
-        yield f"the most believed {written['held_out']!r} is now {mean!r}"
+    mean = judges.of(config.robot, config.setting).test(policy).mean
+    if mean != written.held_out:
+        yield f"the most believed {written.held_out!r} is now {mean!r}"
 
 
 def _edited(
     champion: ControllerFile,
     config: ExperimentConfig,
-    judge: Judging,
+    judges: "Judges",
 ) -> Iterator[str]:
     """Whether robot or arena have been edited since."""
-    now = dict(judge(config.robot, config.setting).scene.sha256)
+    now = dict(judges.of(config.robot, config.setting).scene.sha256)
     if champion.origin.mjcf_sha256 != now:
         yield "its robot or arena has been edited since"
 

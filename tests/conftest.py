@@ -10,6 +10,7 @@ os.environ["RERUN_STRICT"] = "1"
 
 import pytest
 
+from epuck_mj.host.interruption import SIGNALS
 from epuck_mj.scene.model import Scene, load_scene
 
 # ignored where tests run in the background of a script, and by all that they start
@@ -43,3 +44,18 @@ def alone(tmp_path, monkeypatch):
 def scene(request) -> Scene:
     """Each shipped robot, in turn."""
     return load_scene(request.param, "arena")
+
+
+@pytest.fixture(scope="session")
+def planar() -> Scene:
+    """The cheaper one of the two."""
+    return load_scene("epuck_planar", "arena")
+
+
+@pytest.fixture
+def handlers():
+    """The handlers of the signals that end a drive, which are there again later."""
+    before = {signum: signal.getsignal(signum) for signum in SIGNALS}
+    yield before
+    for signum, handler in before.items():
+        signal.signal(signum, handler)

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-PATIENCE = 60.0
-"""Whatever takes longer [s] hangs, on however busy a machine."""
+PATIENCE = 600.0
+"""Whatever takes longer [s] hangs, on however slow and busy a machine."""
 
 
 @contextmanager

@@ -76,9 +76,8 @@ def test_starts_touch_nothing_and_reach_all_of_the_free_space(path: Path, robot:
 
 @arenas
 def test_the_hand_written_follower_follows_its_walls(path: Path):
-    judge = Judge(
-        load_scene("epuck_planar", path.stem), TaskParameters(), START_CLEARANCE, 1
-    )
+    scene = load_scene("epuck_planar", path.stem)
+    judge = Judge(scene, FreeSpace(scene, START_CLEARANCE), TaskParameters(), 1)
     test = judge.test(WallFollower(), 20)
     assert test.behaviour["wall follower"] + test.behaviour["hugger"] >= 0.75
     assert test.metrics["laps"] is not None

@@ -11,7 +11,8 @@ from epuck_mj.host import files
 from evolution.named_policies import named_policies
 from evolution.run import execution
 from evolution.run.directory import RunDirectory
-from evolution.run.execution import Means, Run
+from evolution.run.execution import Run
+from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 

@@ -22,7 +22,6 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import SIGNALS, Interrupted, Interruption
 from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.policies.network import Network
-from epuck_mj.scene.model import load_scene
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.motors import STEP_ANGLE
@@ -33,11 +32,6 @@ from tests.test_fake import fake_process, living, wait_for
 ROOT = Path(__file__).resolve().parent.parent
 CHAMPION = ROOT / "results" / "paper" / "de-best" / "seed-1" / "champion.json"
 AT_WALL = (0.44, 0.0, np.pi / 2)
-
-
-@pytest.fixture(scope="module")
-def planar():
-    return load_scene("epuck_planar", "arena")
 
 
 @pytest.fixture
@@ -434,15 +428,31 @@ def test_list_of_ports():
     assert (done.returncode, done.stderr) == (0, "")
 
 
+LOADED = """
+import contextlib, io, runpy, sys
+for argument in ("--help", "--list-ports", "--nonsense"):
+    sys.argv = ["x", argument]
+    with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
+        runpy.run_module("MODULE", run_name="__main__")
+heavy = {"mujoco", "dm_control", "scipy", "rerun", "matplotlib"}
+print(*sorted(heavy & set(sys.modules)))
+"""
+"""What a command loads that only has to say something."""
+
+
+@pytest.mark.parametrize("module", ["bridge", "bridge.fake", "calibrate"])
+def test_help_costs_no_physics(module):
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED.replace("MODULE", f"epuck_mj.{module}")],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert (done.returncode, done.stdout.strip()) == (0, ""), done.stderr
+    assert "error: Unrecognized options: --nonsense" in done.stderr
+
+
 # signals
-
-
-@pytest.fixture
-def handlers():
-    before = {signum: signal.getsignal(signum) for signum in SIGNALS}
-    yield before
-    for signum, handler in before.items():
-        signal.signal(signum, handler)
 
 
 def test_signals_raise_where_they_may_only(handlers):

@@ -19,11 +19,10 @@ from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Pty
 from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import scenario
-from epuck_mj.bridge.fake.virtual import VirtualPort, VirtualTime
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.bridge.line.wifi_line import WifiLine
-from epuck_mj.calibrate.__main__ import accomplish, calibrate
+from epuck_mj.calibrate.__main__ import calibrate, calibrate_robot
 from epuck_mj.calibrate.fitting import (
     SATURATED,
     fit_gains,
@@ -41,7 +40,6 @@ from epuck_mj.constants import (
     WHEEL_RADIUS,
 )
 from epuck_mj.errors import UserError
-from epuck_mj.host.interruption import SIGNALS
 from epuck_mj.rungs.disturbed import DisturbedRobots
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.scene.model import load_scene
@@ -53,6 +51,7 @@ from epuck_mj.step.sensors import counted, proximity
 from tests.processes import PATIENCE, python_process
 from tests.test_bridge import BUSY
 from tests.test_fake import behind, living, wait_for
+from tests.virtual_time import VirtualPort, VirtualTime
 
 GAINS = np.array([0.62, 1.45, 0.9, 1.1, 0.75, 1.3, 1.0, 1.2])
 RADII = (0.01995, 0.02025)
@@ -300,7 +299,7 @@ class World:
 
     def calibrate(self, output, *steps):
         try:
-            return accomplish(
+            return calibrate_robot(
                 steps or tuple(STEPS),
                 output,
                 self.connect,
@@ -323,11 +322,6 @@ def changed_robot(folder, radii, track):
     path = folder / "other.xml"
     path.write_text(text)
     return load_scene(str(path), "arena")
-
-
-@pytest.fixture(scope="module")
-def planar():
-    return load_scene("epuck_planar", "arena")
 
 
 @pytest.fixture
@@ -448,14 +442,6 @@ def test_the_end_of_the_input(planar, output, part):
 
 
 # what goes wrong on the way
-
-
-@pytest.fixture
-def handlers():
-    before = {signum: signal.getsignal(signum) for signum in SIGNALS}
-    yield before
-    for signum, handler in before.items():
-        signal.signal(signum, handler)
 
 
 @pytest.mark.parametrize("step", list(STEPS))

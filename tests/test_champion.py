@@ -1,9 +1,8 @@
 """The champion: who may be it, who is it, and what fresh starts say of it."""
 
-import json
 import math
 import statistics
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +14,8 @@ from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.step.control import control_step
 from epuck_mj.step.sensors import observe
 from evolution.judging import starts as starts_module
-from evolution.judging.held_out import Judge
+from evolution.judging.held_out import Judge, Judges
+from evolution.judging.scores import Believed, Scores
 from evolution.judging.starts import (
     N_TEST,
     held_out_disturbances,
@@ -31,7 +31,7 @@ from evolution.run.champion import (
 )
 from evolution.run.directory import RunDirectory
 from evolution.run.generation_loop import Experiment, Record
-from evolution.run.results import judges, summary, write_results
+from evolution.run.results import write_results
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from evolution.settings.randomness import Purpose
@@ -44,6 +44,10 @@ def tiny(name: str, population: int = 20, **update) -> ExperimentConfig:
     optimizer = replace(config.optimizer, population=population)
     update = {"evaluations": 6 * population, "steps": 25, "trials": 2} | update
     return config.model_copy(update={"optimizer": optimizer} | update)
+
+
+def judges_of(config: ExperimentConfig) -> dict[str, Judge]:
+    return Judges(threads=1).tested_on(config.robot, config.setting)
 
 
 @pytest.fixture(scope="module", params=SHIPPED)
@@ -238,7 +242,7 @@ def written(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(results, "_draw_fitness", lambda *_: None)
         patch.setattr(results, "_show", lambda *_: None)
-        write_results(experiment, judges(experiment.config), directory, threads=1)
+        write_results(experiment, judges_of(experiment.config), directory, threads=1)
     return experiment, directory
 
 
@@ -263,20 +267,20 @@ def test_the_champion_file_holds_every_score(written):
     policy = experiment.config.network.decode(champion.genome)
     tests = {
         robot: judge.test(policy)
-        for robot, judge in judges(experiment.config, threads=1).items()
+        for robot, judge in judges_of(experiment.config).items()
     }
     assert list(tests) == ["epuck_planar", "epuck"]
     # what evolution believed in most, on the robot that it was evolved on
     genome, believed = most_believed(experiment)
-    judge = judges(experiment.config, threads=1)["epuck_planar"]
+    judge = judges_of(experiment.config)["epuck_planar"]
     worth = judge.test(experiment.config.network.decode(genome))
-    assert stored.scores == {
-        "stored": champion.stored_fitness,
-        "validation": champion.validation_fitness,
-        # tuples are lists in JSON
-        "held_out": json.loads(json.dumps({k: asdict(v) for k, v in tests.items()})),
-        "most_believed": {"stored": believed, "held_out": worth.mean},
-    }
+    assert Scores.read(stored.scores, directory.champion) == Scores(
+        stored=champion.stored_fitness,
+        validation=champion.validation_fitness,
+        held_out=tests,
+        most_believed=Believed(stored=believed, held_out=worth.mean),
+    )
+    assert list(stored.scores) == ["stored", "validation", "held_out", "most_believed"]
     assert stored.task == experiment.config.task
     assert stored.origin == Origin(
         "epuck_planar", "arena", 0.01, dict(experiment.scene.sha256)
@@ -292,32 +296,35 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
     experiment = Experiment(config, threads=1)
     list(experiment.run())
     directory = RunDirectory(tmp_path)
-    stored = write_results(experiment, judges(config), directory, threads=1)
-    found = stored.scores["held_out_as_evolved"]
-    assert list(found) == list(stored.scores["held_out"]) == ["epuck_planar", "epuck"]
+    scores = write_results(experiment, judges_of(config), directory, threads=1)
+    stored = controller_file.load(directory.champion)
+    assert Scores.read(stored.scores, directory.champion) == scores
+    found = scores.held_out_as_evolved
+    assert list(found) == list(scores.held_out) == ["epuck_planar", "epuck"]
     # the first of those that anybody draws
     met = held_out_disturbances(config.conditions, Purpose.TEST, N_TEST, config.steps)
     assert met is not None
-    test = judges(config)["epuck"].test(stored.controller, 30, met)
-    assert found["epuck"] == asdict(test)
-    assert found["epuck"]["mean"] != stored.scores["held_out"]["epuck"]["mean"]
-    _, disturbed, _ = summary(stored).splitlines()
+    test = judges_of(config)["epuck"].test(stored.controller, 30, met)
+    assert found["epuck"] == test
+    assert test.mean != scores.held_out["epuck"].mean
+    _, disturbed, _ = scores.in_lines(60).splitlines()
     assert disturbed.startswith("The same with the disturbances it evolved with: ")
 
 
 def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
     _, directory = written
-    stored = controller_file.load(directory.champion)
-    fresh, believed = summary(stored).splitlines()
-    scores = stored.scores["held_out"]
+    stored = controller_file.load(directory.champion).scores
+    scores = Scores.read(stored, directory.champion)
+    fresh, believed = scores.in_lines(20).splitlines()
     parts = []
     for robot in ("epuck_planar", "epuck"):
-        mean, crashes = scores[robot]["mean"], scores[robot]["crash_rate"]
+        test = stored["held_out"][robot]
+        mean, crashes = test["mean"], test["crash_rate"]
         parts.append(f"{robot} {mean:.1f} ({crashes:.0%} crash)")
     assert fresh == (
         "Held-out fitness of 20, mean of 30 fresh starts: " + ", ".join(parts)
     )
-    stored_fitness = stored.scores["stored"]
+    stored_fitness = stored["stored"]
     assert believed == (
         f"Stored fitness of 20, what evolution believes: {stored_fitness:.1f}"
     )
@@ -330,13 +337,12 @@ def test_a_run_on_the_wheeled_robot_is_tested_on_the_plane_as_well(
     monkeypatch.setattr(results, "_show", lambda *_: None)
     experiment = Experiment(tiny("ga", robot="epuck", steps=10, evaluations=20))
     list(experiment.run())
-    written = write_results(
-        experiment, judges(experiment.config), RunDirectory(tmp_path)
-    )
-    assert list(written.scores["held_out"]) == ["epuck", "epuck_planar"]
-    text = (tmp_path / "champion.json").read_text(encoding="utf-8")
-    assert text == written.to_json()
-    assert len(summary(written).splitlines()) == 2
+    directory = RunDirectory(tmp_path)
+    scores = write_results(experiment, judges_of(experiment.config), directory)
+    assert list(scores.held_out) == ["epuck", "epuck_planar"]
+    written = controller_file.load(directory.champion)
+    assert directory.champion.read_text(encoding="utf-8") == written.to_json()
+    assert len(scores.in_lines(10).splitlines()) == 2
 
 
 def test_a_champion_survives_the_checkpoint(finished, tmp_path, monkeypatch):

@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from epuck_mj.check import check_arena, report
+from epuck_mj.check import report
 from epuck_mj.check.__main__ import run
+from epuck_mj.check.arena import check_arena
 from epuck_mj.check.findings import Severity
 from epuck_mj.check.source import read
 from epuck_mj.check.walls import seen_by_rays
 from epuck_mj.errors import UserError
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.scene.robot_parts import ROBOT_BODY
+from tests.processes import PATIENCE
 
 ROBOTS = ("epuck", "epuck_planar")
 SHIPPED = [path.stem for path in sorted(MODELS.glob("arenas/*.xml"))] + ["arena"]
@@ -471,7 +473,7 @@ def test_bad_command_lines_are_one_line_and_status_2(tmp_path):
             [sys.executable, "-m", "epuck_mj.check", *map(str, arguments)],
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=PATIENCE,
             cwd=MODELS.parent,
         )
         assert result.returncode == 2

@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from evolution.judging.scores import Believed, HeldOut, Scores
 from evolution.report.sections.comparisons import comparisons, comparisons_of
 from evolution.reproduce.claims import (
     Claim,
@@ -47,18 +47,19 @@ def run(seed: int, best: float, mean: float, held_out: float, follows: float = 1
     """A run whose best rises in a straight line up to `best`."""
     evaluations = np.arange(1, 11) * 100.0
     tests = {
-        robot: {
-            "mean": held_out,
-            "crash_rate": 1 - follows,
-            "behaviour": {"crashed": 1 - follows, "hugger": follows},
-        }
+        robot: HeldOut(
+            mean=held_out,
+            crash_rate=1 - follows,
+            starts=1000,
+            behaviour={"crashed": 1 - follows, "hugger": follows},
+        )
         for robot in ("epuck_planar", "epuck")
     }
-    scores = {
-        "stored": best,
-        "held_out": tests,
-        "most_believed": {"stored": best, "held_out": held_out - 100},
-    }
+    scores = Scores(
+        stored=best,
+        held_out=tests,
+        most_believed=Believed(stored=best, held_out=held_out - 100),
+    )
     return RunData(
         seed=seed,
         history={
@@ -68,7 +69,8 @@ def run(seed: int, best: float, mean: float, held_out: float, follows: float = 1
             "mean": mean * evaluations / 1000,
             "std": np.ones(10),
         },
-        champion=SimpleNamespace(scores=scores),  # type: ignore[arg-type]
+        champion=None,  # type: ignore[arg-type]
+        scores=scores,
         path=Path(f"seed-{seed}"),
     )
 
@@ -285,8 +287,10 @@ def test_behaviour_is_judged_on_the_last_robot():
 
 def test_runs_without_behaviour_leave_it_open():
     data = study(LIKE_THE_PAPER)
-    for each in data.runs["ga"]:
-        each.champion.scores["held_out"]["epuck"]["behaviour"] = None
+    test = HeldOut(mean=245.0, crash_rate=0.0, starts=1000)
+    older = Scores(stored=245.0, held_out={"epuck_planar": test, "epuck": test})
+    runs = tuple(replace(run, scores=older) for run in data.runs["ga"])
+    data = replace(data, runs={**data.runs, "ga": runs})
     assert verdict(claims(data), "GA", "without crashing") == NOT_MEASURED
 
 
@@ -332,7 +336,10 @@ def test_reproduction_says_everything_once():
     data = study(
         LIKE_THE_PAPER,
         missing=("ga: no finished run of seed 9",),
-        yardstick={"epuck_planar": {"mean": 195.8}, "epuck": {"mean": 196.9}},
+        yardstick={
+            "epuck_planar": HeldOut(mean=195.8, crash_rate=0.0, starts=1000),
+            "epuck": HeldOut(mean=196.9, crash_rate=0.0, starts=1000),
+        },
     )
     text = reproduction(data, None, UNEVOLVED, "python -m evolution.reproduce --quick")
     assert text == reproduction(

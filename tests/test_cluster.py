@@ -20,17 +20,16 @@ import yaml
 from distributed import Client
 
 from epuck_mj.errors import UserError
-from evolution.run.execution import Means
+from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from evolution.study.__main__ import study
 from evolution.study.cluster import carry_out_on_cluster, connection, requirements
 from evolution.study.jobs import Event, Job, carry_out, generations
+from tests.processes import PATIENCE
 
 pytestmark = pytest.mark.slow
 
-TIMEOUT = 60
-"""Seconds for what takes a few on a machine that does nothing else."""
 
 SMALL = {"steps": 20, "trials": 2, "evaluations": 100}
 LONG = {"steps": 100, "trials": 2, "evaluations": 300}
@@ -184,7 +183,7 @@ class Fleet:
 
     @contextmanager
     def client(self) -> Iterator[Any]:
-        with Client(self.address, timeout=TIMEOUT, set_as_default=False) as client:
+        with Client(self.address, timeout=PATIENCE, set_as_default=False) as client:
             yield client
 
     def busy(self, client: Any) -> list[int]:
@@ -196,7 +195,7 @@ class Fleet:
     def stop(self) -> None:
         for process in filter(None, [*self.workers, self.scheduler]):
             process.kill()
-            process.wait(TIMEOUT)
+            process.wait(PATIENCE)
 
 
 @pytest.fixture(scope="module")
@@ -207,7 +206,7 @@ def fleet(tmp_path_factory, preload):
 
 
 def wait_until(moment: Callable[[], object]) -> None:
-    deadline = time.monotonic() + TIMEOUT
+    deadline = time.monotonic() + PATIENCE
     while not moment():
         assert time.monotonic() < deadline
         time.sleep(0.02)
@@ -227,7 +226,7 @@ def meanwhile(act: Callable[[], None]) -> Iterator[None]:
     thread = threading.Thread(target=acting, daemon=True)
     thread.start()
     yield
-    thread.join(TIMEOUT)
+    thread.join(PATIENCE)
     assert not thread.is_alive()
     assert not errors
 
@@ -352,7 +351,7 @@ def refusal(address: str, tmp_path: Path, split: bool = False) -> str:
     started = time.monotonic()
     with pytest.raises(UserError) as info:
         list(carry_out_on_cluster(todo, address, split, racing=True))
-    assert time.monotonic() - started < TIMEOUT / 2
+    assert time.monotonic() - started < PATIENCE / 2
     assert "\n" not in str(info.value)
     return str(info.value)
 
@@ -446,7 +445,7 @@ def test_a_study_on_workers_of_its_own(preload, references, tmp_path):
         | {"DASK_TEMPORARY_DIRECTORY": str(tmp_path)},
         capture_output=True,
         text=True,
-        timeout=TIMEOUT,
+        timeout=PATIENCE,
     )
     assert (process.returncode, process.stderr) == (0, "")
     assert "2 of 2 runs are finished" in process.stdout
@@ -473,7 +472,7 @@ def test_ctrl_c_ends_workers_of_its_own(tmp_path):
         wait_until((tmp_path / "out" / "ga" / "seed-1" / "history.csv").exists)
         # as a terminal does: to everybody
         os.killpg(process.pid, signal.SIGINT)
-        _, stderr = process.communicate(timeout=TIMEOUT)
+        _, stderr = process.communicate(timeout=PATIENCE)
         assert process.returncode == 130
         assert len(stderr.splitlines()) == 1
         assert stderr.startswith("Interrupted; go on with: ")

@@ -11,12 +11,13 @@ import pytest
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import read_arrays
 from epuck_mj.policies.file import load
-from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.calibration import Calibration
 from evolution.evaluate import evaluate
-from evolution.judging.held_out import Judge
+from evolution.judging.held_out import Judge, Judges
 from evolution.run.directory import RunDirectory
-from evolution.run.execution import Means, Run
+from evolution.run.execution import Run
+from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from evolution.verify import verify
@@ -72,8 +73,7 @@ def test_generations_are_tested_one_by_one(finished, tmp_path, capsys):
     assert all(f"{name}, epuck_planar in arena\n" in said for name in names)
     # each is what anybody finds for its genome
     config = load_config(finished / "config.yaml")
-    scene = load_scene("epuck_planar", "arena", config.control_step)
-    judge = Judge(scene, config.task, config.start_clearance)
+    judge = Judges().of("epuck_planar", config.setting)
     genomes = read_arrays(finished / "best_individuals.npz")["genomes"]
     for genome, test in zip(genomes, tests, strict=True):
         assert judge.test(config.network.decode(genome), 20).mean == test["mean"]
@@ -124,8 +124,9 @@ def test_threads_change_nothing(scene):
     from epuck_mj.policies.wall_follower import WallFollower
     from epuck_mj.step.control import TaskParameters
 
+    space, task = FreeSpace(scene, 0.01), TaskParameters(steps=50)
     tests = [
-        Judge(scene, TaskParameters(steps=50), 0.01, threads).test(WallFollower(), 300)
+        Judge(scene, space, task, threads).test(WallFollower(), 300)
         for threads in (1, 2)
     ]
     assert tests[0] == tests[1]

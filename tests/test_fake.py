@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 import signal
 import subprocess
 import threading
@@ -13,13 +14,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from epuck_mj.bridge.errors import LinkLost
+from epuck_mj.bridge.failures import LinkLost
 from epuck_mj.bridge.fake.__main__ import fake
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Endpoint, Pty, Tcp, serve
 from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import scenario
-from epuck_mj.bridge.language.protocol import RESYNC, Steps, ascii
+from epuck_mj.bridge.language import ascii
+from epuck_mj.bridge.language.protocol import RESYNC
+from epuck_mj.bridge.language.replies import Steps
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.bridge.line.serial_port import SerialPort
@@ -69,11 +72,6 @@ def wait_for(condition, what: str) -> None:
     while not condition():
         assert time.monotonic() < deadline, f"never {what}"
         time.sleep(0.01)
-
-
-@pytest.fixture(scope="module")
-def planar():
-    return load_scene("epuck_planar", "arena")
 
 
 @pytest.fixture(params=["pty", "tcp"])
@@ -156,6 +154,17 @@ def test_a_robot_answers_on_its_port(endpoint, planar):
             line.close()
 
 
+def test_the_program_in_the_document(planar, tmp_path, capsys):
+    text = (Path(__file__).parent.parent / "docs" / "bridge.md").read_text()
+    [script] = re.findall(r"^```python\n(.*?)^```", text, re.M | re.S)
+    port = Pty(tmp_path / "e-puck")
+    with living(port, planar) as emulator:
+        exec(script.replace("/tmp/e-puck", port.name), {})
+        assert emulator.body.standing
+    out = capsys.readouterr().out
+    assert re.search(r"^Version 1\.2.*\nSteps\(left=3\d\d, right=-3\d\d\) Prox", out)
+
+
 def test_one_host_after_the_other(endpoint, planar):
     with living(endpoint, planar):
         for _ in range(2):
@@ -172,7 +181,7 @@ def test_a_port_vanishes_and_returns(endpoint, planar):
         link = Link(lambda: SerialPort(name))
         try:
             link.resync(time.monotonic() + PATIENCE)
-            link.ask(ascii.drive(300, 300))
+            link.ask(ascii.drive_order(300, 300))
             with pytest.raises(LinkLost):
                 while True:
                     link.drain(time.monotonic() + 0.02)
@@ -181,7 +190,7 @@ def test_a_port_vanishes_and_returns(endpoint, planar):
             link.reopen(time.monotonic() + PATIENCE)
             assert endpoint.name == name
             link.resync(time.monotonic() + PATIENCE)
-            link.ask(ascii.stop())
+            link.ask(ascii.stop_order())
             assert emulator.body.standing
         finally:
             link.close()

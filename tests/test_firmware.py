@@ -1,39 +1,36 @@
 """The emulated e-puck: its quirks one by one, and the host's language against it."""
 
 import struct
-from itertools import pairwise
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from epuck_mj.bridge.failures import BridgeError, RobotRestarted
 from epuck_mj.bridge.fake.builds import BUILDS
 from epuck_mj.bridge.fake.firmware import Firmware
 from epuck_mj.bridge.fake.motors_and_sensors import MotorTimer, Wheel
 from epuck_mj.bridge.fake.wifi_firmware import WifiFirmware
 from epuck_mj.bridge.fake.wire import Wire
+from epuck_mj.bridge.language import ascii, binary, packets
 from epuck_mj.bridge.language.packets import PacketParser
-from epuck_mj.bridge.language.protocol import (
-    RESYNC,
+from epuck_mj.bridge.language.protocol import RESYNC, greets
+from epuck_mj.bridge.language.replies import (
     Acknowledged,
     Ambient,
-    BridgeError,
     Calibrated,
+    CommandedSpeeds,
     Cycle,
     Proximity,
     Restarted,
-    RobotRestarted,
     Sensors,
-    Speeds,
     Steps,
     Version,
-    ascii,
-    binary,
-    greets,
-    packets,
 )
 from epuck_mj.constants import BYTE_TIME, CALIBRATION_SAMPLES, PROXIMITY_PERIOD
+from tests.test_protocol import pieces
 
 quick = settings(deadline=None, max_examples=60)
 
@@ -101,13 +98,12 @@ class Robot:
         return self.firmware.output(self.now)
 
 
-def ask(robot: Robot, request, cuts=()):
+def ask(robot: Robot, request, cuts: Sequence[int] = ()):
     """The reply to a request, fed in pieces; None if its patience ran out."""
     parser = request.parser()
     came = robot.hear(request.out)
-    places = sorted({0, len(came), *(cut % (len(came) + 1) for cut in cuts)})
-    for a, b in pairwise(places):
-        reply = parser.feed(came[a:b])
+    for piece in pieces(came, cuts):
+        reply = parser.feed(piece)
         if reply is not None:
             return reply
     for _ in range(50):
@@ -185,8 +181,7 @@ ANSWERS = {
 @quick
 def test_answers(heard, said, cuts):
     robot = Robot()
-    places = sorted({0, len(heard), *(cut % (len(heard) + 1) for cut in cuts)})
-    assert b"".join(robot.hear(heard[a:b]) for a, b in pairwise(places)) == said
+    assert b"".join(map(robot.hear, pieces(heard, cuts))) == said
     assert robot.wait(1.0) == b""
 
 
@@ -220,7 +215,7 @@ def test_the_parser_waits_for_operands_for_ever():
     assert robot.hear(b"V\rE\r") == b""
     assert robot.hear(b"\0") == b""
     assert resync(robot)
-    assert ask(robot, ascii.speeds()) == Speeds(300, 0x0D56)
+    assert ask(robot, ascii.speeds_query()) == CommandedSpeeds(300, 0x0D56)
 
 
 def test_a_banner_at_a_reset_only():
@@ -427,21 +422,27 @@ def test_only_slow_motors_that_turn_are_slowed():
 cuts = st.lists(st.integers(0, 2**10), max_size=5)
 
 SAME = [
-    (ascii.proximity(), Proximity(COUNTS)),
-    (ascii.ambient(), Ambient(LIGHT)),
-    (ascii.steps(), Steps(1234, -4321)),
-    (ascii.speeds(), Speeds(0, 0)),
-    (ascii.led(8, 2), Acknowledged("l")),
-    (ascii.stop(), Acknowledged("s")),
-    (ascii.drive(0, 0), Acknowledged("d")),
-    (binary.proximity(), Proximity(COUNTS)),
-    (binary.ambient(), Ambient(LIGHT)),
-    (binary.steps(), Steps(1234, -4321)),
-    (binary.speeds(), Speeds(0, 0)),
-    (binary.drive(0, 0), Speeds(0, 0)),
-    (binary.cycle(0, 0), Cycle(Proximity(COUNTS), Steps(1234, -4321))),
-    (binary.checked_cycle(0, 0, True), Cycle(Proximity(COUNTS), Steps(1234, -4321))),
-    (binary.checked_cycle(0, 0, False), Cycle(Proximity(COUNTS), Steps(1234, -4321))),
+    (ascii.proximity_query(), Proximity(COUNTS)),
+    (ascii.ambient_query(), Ambient(LIGHT)),
+    (ascii.steps_query(), Steps(1234, -4321)),
+    (ascii.speeds_query(), CommandedSpeeds(0, 0)),
+    (ascii.led_order(8, 2), Acknowledged("l")),
+    (ascii.stop_order(), Acknowledged("s")),
+    (ascii.drive_order(0, 0), Acknowledged("d")),
+    (binary.proximity_packet(), Proximity(COUNTS)),
+    (binary.ambient_packet(), Ambient(LIGHT)),
+    (binary.steps_packet(), Steps(1234, -4321)),
+    (binary.speeds_packet(), CommandedSpeeds(0, 0)),
+    (binary.drive_packet(0, 0), CommandedSpeeds(0, 0)),
+    (binary.cycle_packet(0, 0), Cycle(Proximity(COUNTS), Steps(1234, -4321))),
+    (
+        binary.echoed_cycle_packet(0, 0, True),
+        Cycle(Proximity(COUNTS), Steps(1234, -4321)),
+    ),
+    (
+        binary.echoed_cycle_packet(0, 0, False),
+        Cycle(Proximity(COUNTS), Steps(1234, -4321)),
+    ),
 ]
 """Requests that leave a robot standing, and what it answers."""
 
@@ -472,19 +473,21 @@ def test_requests_that_change_something(build):
     robot = Robot(build)
     lines = tuple(BUILDS[build].version)
     expected = Version((lines[0].removeprefix("v,"), *lines[1:]))
-    assert ask(robot, ascii.version()) == expected
-    assert ask(robot, ascii.calibrate()) == Calibrated()
-    assert ask(robot, ascii.proximity()) == Proximity((0,) * 8)
-    assert ask(robot, binary.cycle(-1000, 1000)) == Cycle(
+    assert ask(robot, ascii.version_query()) == expected
+    assert ask(robot, ascii.calibration_order()) == Calibrated()
+    assert ask(robot, ascii.proximity_query()) == Proximity((0,) * 8)
+    assert ask(robot, binary.cycle_packet(-1000, 1000)) == Cycle(
         Proximity((0,) * 8), Steps(0, 0)
     )
     robot.wait(1.0)
-    assert ask(robot, ascii.steps()) == Steps(-1000, 1000)
-    assert ask(robot, ascii.drive(300, 301)) == Acknowledged("d")
-    assert ask(robot, binary.speeds()) == Speeds(300, 301)
-    assert ask(robot, ascii.reset()) == (None if build == "epuck2" else Restarted())
-    expected = Speeds(300, 301) if build == "epuck2" else Speeds(0, 0)
-    assert ask(robot, ascii.speeds()) == expected
+    assert ask(robot, ascii.steps_query()) == Steps(-1000, 1000)
+    assert ask(robot, ascii.drive_order(300, 301)) == Acknowledged("d")
+    assert ask(robot, binary.speeds_packet()) == CommandedSpeeds(300, 301)
+    assert ask(robot, ascii.reset_order()) == (
+        None if build == "epuck2" else Restarted()
+    )
+    expected = CommandedSpeeds(300, 301) if build == "epuck2" else CommandedSpeeds(0, 0)
+    assert ask(robot, ascii.speeds_query()) == expected
 
 
 @given(
@@ -531,10 +534,10 @@ def test_resync_after_anything_the_robot_heard(build, heard):
     assert resync(robot, n_tries=60)
     assert robot.wait(0.3) == b""
     robot.hear(b"P,11,-12\r")
-    cycle = ask(robot, binary.checked_cycle(0, 0, True))
+    cycle = ask(robot, binary.echoed_cycle_packet(0, 0, True))
     assert isinstance(cycle, Cycle)
     assert cycle.steps == Steps(11, -12)
-    assert ask(robot, ascii.speeds()) == Speeds(0, 0)
+    assert ask(robot, ascii.speeds_query()) == CommandedSpeeds(0, 0)
 
 
 @given(build=st.sampled_from(V1), case=asked, cut=st.integers(0, 60))
@@ -562,12 +565,12 @@ def test_a_reset_in_the_middle_of_a_reply(build, case, cut):
 
 def test_a_robot_that_was_reset_is_found_out_by_its_speeds():
     robot = Robot()
-    assert ask(robot, binary.checked_cycle(300, 300, True)) is not None
+    assert ask(robot, binary.echoed_cycle_packet(300, 300, True)) is not None
     robot.firmware.reset(robot.now)
     # the banner is lost
     robot.wait(0.1)
     with pytest.raises(BridgeError, match="the robot was reset"):
-        ask(robot, binary.checked_cycle(300, 300, False))
+        ask(robot, binary.echoed_cycle_packet(300, 300, False))
 
 
 # e-puck2 over TCP
@@ -588,7 +591,7 @@ def test_a_wheel_over_wifi(chunks):
     body.turned = [40_000.0, 0.0]
     robot = WifiFirmware(body, 0.0)
     body.turned = [40_000.0 + 2**15, -5.0]
-    command = packets.command(-700, 1000)
+    command = packets.wifi_command(-700, 1000)
     robot.feed(command[:7], 0.0)
     robot.feed(command[7:], 0.001)
     said = robot.output(0.1)
@@ -607,7 +610,7 @@ def test_a_wheel_over_wifi(chunks):
 def test_calibration_over_wifi():
     body = Puck()
     robot = WifiFirmware(body, 0.0)
-    robot.feed(packets.command(0, 0, calibrate=True), 0.0)
+    robot.feed(packets.wifi_command(0, 0, calibrate=True), 0.0)
     parser = PacketParser()
     found = parser.feed(b"".join(robot.output(k / 200) for k in range(400)))
     assert found[0].proximity == Proximity(COUNTS)
@@ -618,14 +621,14 @@ def test_wifi_drops_what_does_not_fit_its_queue():
     body = Puck()
     robot = WifiFirmware(body, 0.0)
     for speed in range(100, 900, 100):
-        robot.feed(packets.command(speed, 0), 0.0)
+        robot.feed(packets.wifi_command(speed, 0), 0.0)
     robot.output(1.0)
     assert body.wheels[0].rate == 500
 
 
 def test_images_are_skipped():
     robot = WifiFirmware(Puck(), 0.0)
-    command = bytearray(packets.command(0, 0))
+    command = bytearray(packets.wifi_command(0, 0))
     command[1] = packets.STREAM_IMAGE | packets.STREAM_SENSORS
     robot.feed(bytes(command), 0.0)
     said = robot.output(0.0201)
@@ -691,7 +694,7 @@ def test_nothing_wrong_is_believed_over_a_bad_line():
     for k in range(300):
         try:
             # the body of this robot has no wheels to turn
-            cycle = ask(binary.checked_cycle(3 * k, -2 * k, True))
+            cycle = ask(binary.echoed_cycle_packet(3 * k, -2 * k, True))
         except BridgeError:
             cycle = None
         if cycle is not None:

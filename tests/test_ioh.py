@@ -108,8 +108,8 @@ def a_run(evaluations, best):
         "evaluations": np.array(evaluations, float),
         "best": np.array(best, float),
     }
-    champion = None
-    return RunData(1, columns, champion, Path())  # type: ignore[arg-type]
+    champion = scores = None
+    return RunData(1, columns, champion, scores, Path())  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -8,15 +8,10 @@ import tty
 
 import pytest
 
-from epuck_mj.bridge.errors import BridgeError, LinkLost, NoReply, RobotRestarted
-from epuck_mj.bridge.language.protocol import (
-    RESYNC,
-    Battery,
-    Speeds,
-    Version,
-    ascii,
-    binary,
-)
+from epuck_mj.bridge.failures import BridgeError, LinkLost, NoReply, RobotRestarted
+from epuck_mj.bridge.language import ascii, binary
+from epuck_mj.bridge.language.protocol import RESYNC
+from epuck_mj.bridge.language.replies import Battery, CommandedSpeeds, Version
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_port import SerialPort, ports
 from epuck_mj.errors import UserError
@@ -76,14 +71,14 @@ def linked(*answers) -> tuple[Link, Script]:
 
 def test_a_reply():
     link, script = linked((0.05, b"e,3,-4\r\n"), (0.0, b"\x2c\x01\xff\xff"))
-    assert link.ask(ascii.speeds()) == Speeds(3, -4)
-    assert link.ask(binary.speeds()) == Speeds(300, -1)
-    assert script.heard == ascii.speeds().out + binary.speeds().out
+    assert link.ask(ascii.speeds_query()) == CommandedSpeeds(3, -4)
+    assert link.ask(binary.speeds_packet()) == CommandedSpeeds(300, -1)
+    assert script.heard == ascii.speeds_query().out + binary.speeds_packet().out
     assert link.in_step
 
 
 @pytest.mark.parametrize(
-    "request_", [binary.speeds(), ascii.speeds()], ids=["binary", "ascii"]
+    "request_", [binary.speeds_packet(), ascii.speeds_query()], ids=["binary", "ascii"]
 )
 @pytest.mark.parametrize("cut", [1, 20, len(BANNER) - 3])
 def test_a_banner_in_two_halves_is_a_banner(request_, cut):
@@ -101,50 +96,50 @@ def test_a_banner_in_two_halves_is_a_banner(request_, cut):
 )
 def test_battery(state, text):
     link, _ = linked((0.0, b"b," + state.encode() + b"\r\n"))
-    assert link.ask(ascii.battery()) == Battery(state)
+    assert link.ask(ascii.battery_query()) == Battery(state)
     assert str(Battery(state)) == text
 
 
 def test_a_battery_that_nobody_tells():
     link, _ = linked((0.0, b"z,Command not found\r\n"))
     with pytest.raises(BridgeError, match="not found"):
-        link.ask(ascii.battery())
+        link.ask(ascii.battery_query())
 
 
 def test_no_reply_ends_in_time_and_out_of_step():
     link, script = linked()
     with pytest.raises(NoReply, match=r"E \(commanded speeds\) in time; came nothing"):
-        link.ask(ascii.speeds())
+        link.ask(ascii.speeds_query())
     assert script.now == pytest.approx(0.3, abs=0.02)
     assert not link.in_step
     heard = script.heard
     with pytest.raises(BridgeError, match="in step"):
-        link.ask(ascii.speeds())
+        link.ask(ascii.speeds_query())
     assert script.heard == heard
 
 
 def test_until_is_sooner_than_patience():
     link, script = linked((0.2, b"e,0,0\r\n"))
     with pytest.raises(NoReply):
-        link.ask(ascii.speeds(), until=0.1)
+        link.ask(ascii.speeds_query(), until=0.1)
     assert script.now == pytest.approx(0.1, abs=0.011)
 
 
 def test_a_lost_byte_is_not_waited_for():
     link, script = linked((0.02, b"\x2c\x01\xff"))
     with pytest.raises(NoReply, match=r"came b',\\x01\\xff'"):
-        link.ask(binary.speeds())
+        link.ask(binary.speeds_packet())
     assert script.now < 0.1
 
 
 def test_leftovers_before_ascii_are_dropped_and_before_binary_they_are_not():
     link, script = linked((0.0, b"e,1,2\r\nhello"), (0.0, b"e,3,4\r\n"))
-    link.ask(ascii.speeds())
-    assert link.ask(ascii.speeds()) == Speeds(3, 4)
+    link.ask(ascii.speeds_query())
+    assert link.ask(ascii.speeds_query()) == CommandedSpeeds(3, 4)
     script.due = [(script.now, b"x")]
     heard = script.heard
     with pytest.raises(BridgeError, match="silence before E"):
-        link.ask(binary.speeds())
+        link.ask(binary.speeds_packet())
     assert script.heard == heard
     assert not link.in_step
 
@@ -153,7 +148,7 @@ def test_a_banner_before_a_request():
     link, script = linked((0.0, b"e,1,2\r\n"))
     script.due = [(0.0, BANNER)]
     with pytest.raises(RobotRestarted):
-        link.ask(ascii.speeds())
+        link.ask(ascii.speeds_query())
     assert not link.in_step
 
 
@@ -198,11 +193,11 @@ def test_a_lost_port_is_closed_and_opened_again():
     link, script = linked((0.0, BARRIER))
     script.gone = True
     with pytest.raises(LinkLost):
-        link.ask(ascii.speeds())
+        link.ask(ascii.speeds_query())
     assert link.lost
     assert script.closed
     with pytest.raises(LinkLost, match="one that was lost"):
-        link.ask(ascii.speeds())
+        link.ask(ascii.speeds_query())
     script.gone = False
     link.reopen(script.now + 1)
     assert not link.lost
@@ -240,7 +235,7 @@ def test_a_pseudo_terminal():
         assert os.read(master, 100) == RESYNC.flush
         answer = threading.Timer(0.05, os.write, (master, b"e,7,8\r\n"))
         answer.start()
-        assert link.ask(ascii.speeds()) == Speeds(7, 8)
+        assert link.ask(ascii.speeds_query()) == CommandedSpeeds(7, 8)
         answer.join()
         # a second host
         with pytest.raises(UserError, match="is busy: another program has it"):
@@ -249,7 +244,7 @@ def test_a_pseudo_terminal():
         os.close(master)
         master = slave = -1
         with pytest.raises(LinkLost, match="a robot at '/dev/"):
-            link.ask(ascii.speeds())
+            link.ask(ascii.speeds_query())
     finally:
         link.close()
         for handle in (master, slave):
@@ -330,4 +325,4 @@ def test_list_of_ports():
 def test_version_of_a_script():
     link, _ = linked((0.0, BARRIER))
     expected = Version(("Version 1.2.2 August 2008 GCtronic", "HW version: 1.1"))
-    assert link.ask(ascii.version()) == expected
+    assert link.ask(ascii.version_query()) == expected

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from epuck_mj import constants as c
-from epuck_mj.check import check_arena
+from epuck_mj.check.arena import check_arena
 from epuck_mj.check.findings import Severity
 from epuck_mj.errors import UserError
 from epuck_mj.scene.model import load_scene

@@ -1,5 +1,6 @@
 """Policies by name: champions, past generations, the follower written by hand."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -12,10 +13,12 @@ from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.step.control import TaskParameters
+from evolution.judging.scores import KnownScores
 from evolution.named_policies import NamedPolicy, described, named_policies
 from evolution.replay.trials import labels
 from evolution.run.directory import RunDirectory
-from evolution.run.execution import Means, Run
+from evolution.run.execution import Run
+from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 
@@ -40,6 +43,14 @@ def evolved(tmp_path_factory) -> Path:
 def copy(evolved, tmp_path) -> Path:
     """To be damaged."""
     return Path(shutil.copytree(evolved, tmp_path / "run"))
+
+
+def of_a_person(folder: Path, scores: dict) -> NamedPolicy:
+    """The policy of a controller file with those scores."""
+    path = champion(folder / "a.json")
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"scores": scores}))
+    (policy,) = named_policies(str(path))
+    return policy
 
 
 def champion(path: Path, robot: str = "epuck_planar") -> Path:
@@ -73,7 +84,7 @@ def test_a_controller_file_says_what_it_is_for(tmp_path):
     path = champion(tmp_path / "a.json", "epuck")
     (policy,) = named_policies(str(path))
     assert (policy.robot, policy.arena, policy.task.steps) == ("epuck", "round", 7)
-    assert policy.scores == {"stored": 3.5}
+    assert policy.scores == KnownScores(stored=3.5)
     assert policy.config is None
     assert policy.policy(np.ones(8)).tolist() == pytest.approx([0.5, 0])
 
@@ -99,7 +110,8 @@ def test_generations_are_the_best_individuals_of_a_run_that_goes_on(evolved):
         expected = config.network.decode(checkpoint["best_genomes"][generation])
         seen = np.linspace(0, 1, 8)
         np.testing.assert_array_equal(policy.policy(seen), expected(seen))
-        assert policy.scores == {"stored": checkpoint["records"][generation, 2]}
+        stored = checkpoint["records"][generation, 2]
+        assert policy.scores == KnownScores(stored=stored)
         assert policy.task.steps == 15
         assert policy.start_clearance == 0.03
         assert policy.config == config
@@ -213,13 +225,36 @@ def test_what_is_known_of_a_policy_is_described(evolved, tmp_path):
         "damaged": {"mean": "no"},
         "none": None,
     }
-    policy = NamedPolicy(
-        "x", WallFollower(), TaskParameters(), scores={"held_out": held_out}
-    )
-    text = described(policy)
+    text = described(of_a_person(tmp_path, {"held_out": held_out}))
     assert "- Held-out fitness, epuck: 212.2 over 1,000 starts, 12.5% crash" in text
     assert "damaged" not in text
-    assert "arena: arena" in text
-    for scores in ({"stored": "no"}, {"held_out": 3}, {"stored": None}):
-        policy = NamedPolicy("x", WallFollower(), TaskParameters(), scores=scores)
-        assert "Stored" not in described(policy)
+    assert "arena: round" in text
+    assert "Stored" not in text
+
+
+@pytest.mark.parametrize(
+    "scores",
+    [
+        {},
+        {"note": "the best"},
+        {"stored": "no"},
+        {"stored": None, "validation": True},
+        {"stored": float("nan")},
+        {"held_out": 3},
+        {"held_out": [1]},
+        {"held_out": {"epuck": {"mean": 3.0}}},
+        {"held_out": {"epuck": {"mean": 3.0, "crash_rate": 0.1, "starts": "9"}}},
+    ],
+    ids=str,
+)
+def test_of_unknown_scores_nothing_is_said(tmp_path, scores):
+    policy = of_a_person(tmp_path, scores)
+    assert policy.scores == KnownScores()
+    assert described(policy).startswith(f"## {policy.name}\n\n\n```\n")
+
+
+def test_scores_that_are_known_are_said_beside_unknown_ones(tmp_path):
+    scores = {"stored": 240, "validation": "high", "most_believed": {}}
+    text = described(of_a_person(tmp_path, scores))
+    assert "- Stored fitness, what evolution believed: 240.0\n" in text
+    assert "validation" not in text

@@ -1,32 +1,29 @@
 """The robot's language, byte by byte; the parsers under anything that may come."""
 
 import struct
+from collections.abc import Sequence
 from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from epuck_mj.bridge.failures import BridgeError, RobotRestarted
+from epuck_mj.bridge.language import ascii, binary, packets
 from epuck_mj.bridge.language.packets import PacketParser
-from epuck_mj.bridge.language.protocol import (
-    RESYNC,
+from epuck_mj.bridge.language.parsing import Request
+from epuck_mj.bridge.language.protocol import RESYNC, greets
+from epuck_mj.bridge.language.replies import (
     Acknowledged,
     Ambient,
-    BridgeError,
     Calibrated,
+    CommandedSpeeds,
     Cycle,
     Proximity,
-    Request,
     Restarted,
-    RobotRestarted,
     Sensors,
-    Speeds,
     Steps,
     Version,
-    ascii,
-    binary,
-    greets,
-    packets,
 )
 from epuck_mj.errors import UserError
 
@@ -41,33 +38,38 @@ BANNER = b'\x0c\x07WELCOME to the SerCom protocol on e-Puck\r\nsomething about "
 ASCII = {
     # name: request, bytes sent, bytes that come, reply
     "V, one line": (
-        ascii.version(),
+        ascii.version_query(),
         b"V\rE\r",
         b"v,Version 2.0.0 January 2008\r\ne,0,0\r\n",
         Version(("Version 2.0.0 January 2008",)),
     ),
     "V, two lines": (
-        ascii.version(),
+        ascii.version_query(),
         b"V\rE\r",
         b"v,Version 1.2.2 August 2008 GCtronic\r\nHW version: 1.1\r\ne,-5,1200\r\n",
         Version(("Version 1.2.2 August 2008 GCtronic", "HW version: 1.1")),
     ),
     "K": (
-        ascii.calibrate(),
+        ascii.calibration_order(),
         b"K\r",
         b"k, Starting calibration - keep clear\r\nk, Calibration finished\r\n",
         Calibrated(),
     ),
-    "N": (ascii.proximity(), b"N\r", b"n" + COUNTS_ASCII, Proximity(COUNTS)),
-    "O": (ascii.ambient(), b"O\r", b"o" + COUNTS_ASCII, Ambient(COUNTS)),
-    "Q": (ascii.steps(), b"Q\r", b"q,-32768,32767\r\n", Steps(-32768, 32767)),
-    "E": (ascii.speeds(), b"E\r", b"e,-300,1200\r\n", Speeds(-300, 1200)),
-    "D": (ascii.drive(-1000, 7), b"D,-1000,7\r", b"d\r\n", Acknowledged("d")),
-    "S": (ascii.stop(), b"S\r", b"s\r\n", Acknowledged("s")),
-    "L": (ascii.led(7, 2), b"L,7,2\r", b"l\r\n", Acknowledged("l")),
-    "L, all": (ascii.led(8, 1), b"L,8,1\r", b"l\r\n", Acknowledged("l")),
+    "N": (ascii.proximity_query(), b"N\r", b"n" + COUNTS_ASCII, Proximity(COUNTS)),
+    "O": (ascii.ambient_query(), b"O\r", b"o" + COUNTS_ASCII, Ambient(COUNTS)),
+    "Q": (ascii.steps_query(), b"Q\r", b"q,-32768,32767\r\n", Steps(-32768, 32767)),
+    "E": (
+        ascii.speeds_query(),
+        b"E\r",
+        b"e,-300,1200\r\n",
+        CommandedSpeeds(-300, 1200),
+    ),
+    "D": (ascii.drive_order(-1000, 7), b"D,-1000,7\r", b"d\r\n", Acknowledged("d")),
+    "S": (ascii.stop_order(), b"S\r", b"s\r\n", Acknowledged("s")),
+    "L": (ascii.led_order(7, 2), b"L,7,2\r", b"l\r\n", Acknowledged("l")),
+    "L, all": (ascii.led_order(8, 1), b"L,8,1\r", b"l\r\n", Acknowledged("l")),
     "R": (
-        ascii.reset(),
+        ascii.reset_order(),
         b"R\r",
         b"r\r\nSelector pos 3\r\n\x0c\x07WELCOME to the SerCom protocol on e-Puck\r\n",
         Restarted(),
@@ -75,30 +77,30 @@ ASCII = {
 }
 
 BINARY = {
-    "N": (binary.proximity(), "b2 00", COUNTS_BINARY, Proximity(COUNTS)),
-    "O": (binary.ambient(), "b1 00", COUNTS_BINARY, Ambient(COUNTS)),
-    "Q": (binary.steps(), "af 00", PAIR_BINARY, Steps(-300, 300)),
-    "E": (binary.speeds(), "bb 00", PAIR_BINARY, Speeds(-300, 300)),
+    "N": (binary.proximity_packet(), "b2 00", COUNTS_BINARY, Proximity(COUNTS)),
+    "O": (binary.ambient_packet(), "b1 00", COUNTS_BINARY, Ambient(COUNTS)),
+    "Q": (binary.steps_packet(), "af 00", PAIR_BINARY, Steps(-300, 300)),
+    "E": (binary.speeds_packet(), "bb 00", PAIR_BINARY, CommandedSpeeds(-300, 300)),
     "D E": (
-        binary.drive(-300, 300),
+        binary.drive_packet(-300, 300),
         "bc d4fe 2c01 bb 00",
         PAIR_BINARY,
-        Speeds(-300, 300),
+        CommandedSpeeds(-300, 300),
     ),
     "D N Q": (
-        binary.cycle(1000, -1),
+        binary.cycle_packet(1000, -1),
         "bc e803 ffff b2 af 00",
         COUNTS_BINARY + PAIR_BINARY,
         Cycle(Proximity(COUNTS), Steps(-300, 300)),
     ),
     "D N Q E": (
-        binary.checked_cycle(-300, 300, True),
+        binary.echoed_cycle_packet(-300, 300, True),
         "bc d4fe 2c01 b2 af bb 00",
         COUNTS_BINARY + bytes.fromhex("0100 0200") + PAIR_BINARY,
         Cycle(Proximity(COUNTS), Steps(1, 2)),
     ),
     "N Q E": (
-        binary.checked_cycle(-300, 300, False),
+        binary.echoed_cycle_packet(-300, 300, False),
         "b2 af bb 00",
         COUNTS_BINARY + bytes.fromhex("0100 0200") + PAIR_BINARY,
         Cycle(Proximity(COUNTS), Steps(1, 2)),
@@ -126,7 +128,7 @@ def outcome(request: Request, chunks):
     return None
 
 
-def pieces(data: bytes, cuts: list[int]) -> list[bytes]:
+def pieces(data: bytes, cuts: Sequence[int]) -> list[bytes]:
     places = sorted({0, len(data), *(cut % (len(data) + 1) for cut in cuts)})
     return [data[a:b] for a, b in pairwise(places)]
 
@@ -166,7 +168,7 @@ def test_binary_bytes(request_, out, came, reply):
     [("D", 0xBC), ("N", 0xB2), ("Q", 0xAF), ("E", 0xBB), ("O", 0xB1), ("L", 0xB4)],
 )
 def test_binary_command_codes(letter, code):
-    assert binary.command(letter) == bytes([code])
+    assert binary.letter_code(letter) == bytes([code])
 
 
 @pytest.mark.parametrize(("request_", "_", "came", "reply"), table(ASCII))
@@ -276,22 +278,38 @@ def test_a_banner_is_a_restart(request_):
 @pytest.mark.parametrize(
     ("request_", "came"),
     [
-        pytest.param(ascii.proximity(), b"n,1,2,3,4,5,6,7\r\n", id="too few values"),
-        pytest.param(ascii.proximity(), b"n" + b",1" * 9 + b"\r\n", id="too many"),
-        pytest.param(ascii.proximity(), b"n" + b",1" * 8 + b"\n", id="return lost"),
-        pytest.param(ascii.proximity(), b"n,1,2\x90,3\r\n", id="garbage inside"),
-        pytest.param(ascii.proximity(), b"n" + b",4096" * 8 + b"\r\n", id="13 bits"),
-        pytest.param(ascii.proximity(), b"n" + b",-1" * 8 + b"\r\n", id="negative"),
-        pytest.param(ascii.steps(), b"q,32768,0\r\n", id="17 bits"),
-        pytest.param(ascii.version(), b"v,Ver\x80sion 1\r\n", id="damaged version"),
-        pytest.param(ascii.stop(), b"z,Command not found\r\n", id="not understood"),
-        pytest.param(ascii.speeds(), b"x" * 300, id="no line"),
-        pytest.param(ascii.speeds(), b"x" * 300 + b"\ne,1,2\r\n", id="long line"),
-        pytest.param(binary.proximity(), b"\x00\x10" * 8, id="binary, 13 bits"),
-        pytest.param(binary.ambient(), b"\xff\xff" * 8, id="binary, negative"),
-        pytest.param(binary.drive(1, 2), b"\1\0\3\0", id="other speeds"),
         pytest.param(
-            binary.checked_cycle(300, 300, False), bytes(24), id="speeds of a reset"
+            ascii.proximity_query(), b"n,1,2,3,4,5,6,7\r\n", id="too few values"
+        ),
+        pytest.param(
+            ascii.proximity_query(), b"n" + b",1" * 9 + b"\r\n", id="too many"
+        ),
+        pytest.param(
+            ascii.proximity_query(), b"n" + b",1" * 8 + b"\n", id="return lost"
+        ),
+        pytest.param(ascii.proximity_query(), b"n,1,2\x90,3\r\n", id="garbage inside"),
+        pytest.param(
+            ascii.proximity_query(), b"n" + b",4096" * 8 + b"\r\n", id="13 bits"
+        ),
+        pytest.param(
+            ascii.proximity_query(), b"n" + b",-1" * 8 + b"\r\n", id="negative"
+        ),
+        pytest.param(ascii.steps_query(), b"q,32768,0\r\n", id="17 bits"),
+        pytest.param(
+            ascii.version_query(), b"v,Ver\x80sion 1\r\n", id="damaged version"
+        ),
+        pytest.param(
+            ascii.stop_order(), b"z,Command not found\r\n", id="not understood"
+        ),
+        pytest.param(ascii.speeds_query(), b"x" * 300, id="no line"),
+        pytest.param(ascii.speeds_query(), b"x" * 300 + b"\ne,1,2\r\n", id="long line"),
+        pytest.param(binary.proximity_packet(), b"\x00\x10" * 8, id="binary, 13 bits"),
+        pytest.param(binary.ambient_packet(), b"\xff\xff" * 8, id="binary, negative"),
+        pytest.param(binary.drive_packet(1, 2), b"\1\0\3\0", id="other speeds"),
+        pytest.param(
+            binary.echoed_cycle_packet(300, 300, False),
+            bytes(24),
+            id="speeds of a reset",
         ),
     ],
 )
@@ -305,22 +323,26 @@ def test_wrong_replies_raise(request_, came):
 @pytest.mark.parametrize(
     ("request_", "came"),
     [
-        pytest.param(ascii.drive(1, 1), b"xd\r\n", id="acknowledgement glued"),
-        pytest.param(ascii.drive(1, 1), b"d", id="no end"),
-        pytest.param(ascii.calibrate(), b"k, Calibration finished\r\n", id="no start"),
+        pytest.param(ascii.drive_order(1, 1), b"xd\r\n", id="acknowledgement glued"),
+        pytest.param(ascii.drive_order(1, 1), b"d", id="no end"),
         pytest.param(
-            ascii.calibrate(), b"k, Calibration finished\r\n" * 2, id="two older ends"
+            ascii.calibration_order(), b"k, Calibration finished\r\n", id="no start"
         ),
         pytest.param(
-            ascii.calibrate(),
+            ascii.calibration_order(),
+            b"k, Calibration finished\r\n" * 2,
+            id="two older ends",
+        ),
+        pytest.param(
+            ascii.calibration_order(),
             b"k, Starting calibration\r\nk, Calibration finished\r \r\n",
             id="end damaged",
         ),
-        pytest.param(ascii.version(), b"e,1,2\r\n", id="end without version"),
-        pytest.param(ascii.steps(), b"xq,1,2\r\n", id="another word"),
-        pytest.param(ascii.steps(), b"e,1,2\r\n", id="another letter"),
-        pytest.param(ascii.steps(), b"Q,1,2\r\n", id="echo"),
-        pytest.param(binary.cycle(0, 0), bytes(19), id="byte lost"),
+        pytest.param(ascii.version_query(), b"e,1,2\r\n", id="end without version"),
+        pytest.param(ascii.steps_query(), b"xq,1,2\r\n", id="another word"),
+        pytest.param(ascii.steps_query(), b"e,1,2\r\n", id="another letter"),
+        pytest.param(ascii.steps_query(), b"Q,1,2\r\n", id="echo"),
+        pytest.param(binary.cycle_packet(0, 0), bytes(19), id="byte lost"),
     ],
 )
 def test_no_reply_yet(request_, came):
@@ -328,7 +350,7 @@ def test_no_reply_yet(request_, came):
 
 
 def test_half_a_line_before_a_reply_does_no_harm():
-    assert outcome(ascii.steps(), [b"\xff\x00junk 7 q,3,-4\r\n"]) == Steps(3, -4)
+    assert outcome(ascii.steps_query(), [b"\xff\x00junk 7 q,3,-4\r\n"]) == Steps(3, -4)
 
 
 @given(
@@ -339,7 +361,7 @@ def test_half_a_line_before_a_reply_does_no_harm():
 )
 @quick
 def test_the_check_sees_a_byte_too_many_or_too_few(place, extra, counts, steps):
-    request = binary.checked_cycle(300, -700, True)
+    request = binary.echoed_cycle_packet(300, -700, True)
     came = struct.pack("<8h2h2h", *counts, *steps, 300, -700)
     inserted = came[:place] + bytes([extra]) + came[place:]
     # the first 24 bytes come alone: only the check can tell
@@ -351,14 +373,14 @@ def test_the_check_sees_a_byte_too_many_or_too_few(place, extra, counts, steps):
 @pytest.mark.parametrize(
     "call",
     [
-        lambda: ascii.drive(1001, 0),
-        lambda: ascii.drive(0, -1001),
-        lambda: binary.cycle(1001, 0),
-        lambda: binary.checked_cycle(0, 1001, False),
-        lambda: packets.command(-1001, 0),
-        lambda: ascii.led(9, 0),
-        lambda: ascii.led(0, 3),
-        lambda: ascii.led(-1, 0),
+        lambda: ascii.drive_order(1001, 0),
+        lambda: ascii.drive_order(0, -1001),
+        lambda: binary.cycle_packet(1001, 0),
+        lambda: binary.echoed_cycle_packet(0, 1001, False),
+        lambda: packets.wifi_command(-1001, 0),
+        lambda: ascii.led_order(9, 0),
+        lambda: ascii.led_order(0, 3),
+        lambda: ascii.led_order(-1, 0),
     ],
 )
 def test_what_the_robot_would_do_otherwise_is_refused(call):
@@ -375,7 +397,7 @@ def test_resync_recipe():
     assert RESYNC.flush == bytes(20) + b"\r"
     assert RESYNC.barrier.out == b"V\rE\r"
     assert len(RESYNC.flush + RESYNC.barrier.out) < 64
-    assert ascii.calibrate().patience > 3
+    assert ascii.calibration_order().patience > 3
 
 
 # e-puck2 over TCP
@@ -398,9 +420,11 @@ SENSORS = Sensors(Proximity(COUNTS), Ambient(COUNTS[::-1]), Steps(-300, 300), 15
 @pytest.mark.parametrize(
     ("command", "out"),
     [
-        pytest.param(packets.command(0, 0), "80 02 00 0000 0000", id="stop"),
-        pytest.param(packets.command(1000, -1), "80 02 00 e803 ffff", id="speeds"),
-        pytest.param(packets.command(0, 0, True), "80 02 01 0000 0000", id="calibrate"),
+        pytest.param(packets.wifi_command(0, 0), "80 02 00 0000 0000", id="stop"),
+        pytest.param(packets.wifi_command(1000, -1), "80 02 00 e803 ffff", id="speeds"),
+        pytest.param(
+            packets.wifi_command(0, 0, True), "80 02 01 0000 0000", id="calibrate"
+        ),
     ],
 )
 def test_packet_commands(command, out):

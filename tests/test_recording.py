@@ -24,6 +24,7 @@ from epuck_mj.show.recording.entities import entities
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.trials.phases import PHASES, phases
 from epuck_mj.trials.recorder import record
+from tests.processes import PATIENCE
 
 TASK = TaskParameters(steps=40)
 START, BESIDE_A_WALL = np.array([[0.4, 0.1, 0.4], [0.35, -0.2, 0.2]])
@@ -129,7 +130,7 @@ class Contents:
 
 def verify(path):
     result = subprocess.run(
-        [RERUN, "rrd", "verify", path], capture_output=True, text=True, timeout=60
+        [RERUN, "rrd", "verify", path], capture_output=True, text=True, timeout=PATIENCE
     )
     assert result.returncode == 0, result.stderr
 
@@ -350,7 +351,7 @@ def test_two_files_of_a_trial_say_the_same(path, scene, trajectory, tmp_path):
     trial = Trial("straight on", trajectory, TASK)
     save_recording(other, scene, [trial], "a title", "# A *summary*")
     result = subprocess.run(
-        [RERUN, "rrd", "compare", path, other], capture_output=True, timeout=60
+        [RERUN, "rrd", "compare", path, other], capture_output=True, timeout=PATIENCE
     )
     assert result.returncode == 0, result.stderr
     identity = [RrdReader(each).recordings()[0].recording_id for each in (path, other)]
@@ -386,7 +387,7 @@ assert not drawing & set(sys.modules), drawing & set(sys.modules)
         env=environment,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
     assert path.stat().st_size > 10_000

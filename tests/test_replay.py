@@ -17,12 +17,17 @@ from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.trials.recorder import record
 from epuck_mj.trials.trajectory import Trajectory
-from evolution.judging.starts import starts_for_test, starts_for_validation
-from evolution.replay import __main__ as command
-from evolution.replay import viewer
+from evolution.judging.starts import (
+    N_TEST,
+    held_out_disturbances,
+    starts_for_test,
+    starts_for_validation,
+)
+from evolution.replay import output, viewer
 from evolution.replay.__main__ import replay
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
+from evolution.settings.randomness import Purpose
 
 STEPS = 8
 SAVED = re.compile(r"(?P<path>\S+\.rrd); watch it: \S+ -m rerun (?P=path)")
@@ -103,10 +108,55 @@ def starts(n, which=starts_for_test):
     return which(space)[:n, :2]
 
 
+def test_noise_is_shown_on_demand(champion):
+    ideal, noisy = shown(champion), shown(champion, "--noise", "strong")
+    (before,), (after,) = ideal.poses.values(), noisy.poses.values()
+    assert before.shape != after.shape or (before != after).any()
+    assert "noise strong" in noisy.summary
+    assert "noise" not in ideal.summary.split("##")[0]
+    others = shown(champion, "--noise", "strong", "--randomise")
+    assert "noise strong, other robots" in others.summary
+    # what is met depends on the start alone: seen again, it is the same
+    again = shown(champion, "--noise", "strong")
+    np.testing.assert_array_equal(next(iter(again.poses.values())), after)
+
+
+def test_a_champion_is_shown_as_it_evolved_unless_asked_otherwise(champion, here):
+    fields = load_config(find_config("ga-randomised")).model_dump() | {"steps": STEPS}
+    text = ExperimentConfig.parsed(fields, "test").to_yaml()
+    (here / "run" / "config.yaml").write_text(text)
+    evolved = shown(champion)
+    assert "noise calibrated, other robots" in evolved.summary
+    asked = shown(champion, "--noise", "calibrated", "--randomise")
+    for name, poses in evolved.poses.items():
+        np.testing.assert_array_equal(poses, asked.poses[name])
+    ideal = shown(champion, "--noise", "none")
+    assert "noise" not in ideal.summary.split("##")[0]
+    # the trial is that of the held-out test of all starts
+    config = ExperimentConfig.parsed(fields, "test")
+    met = held_out_disturbances(config.conditions, Purpose.TEST, N_TEST, STEPS)
+    assert met is not None
+    scene = load_scene("epuck", "arena", config.control_step)
+    start = starts_for_test(FreeSpace(scene, 0.01), 1)[0]
+    policy = load(Path(champion)).controller
+    trial = record(scene, policy, start, TaskParameters(steps=STEPS), met[:1])
+    np.testing.assert_allclose(
+        next(iter(evolved.poses.values())), trial.pose[:, :2], atol=1e-6
+    )
+
+
+@pytest.mark.parametrize(
+    "flags", [("--randomise",), ("--noise", "none", "--randomise")]
+)
+def test_other_robots_need_noise(champion, flags):
+    with pytest.raises(UserError, match="randomise needs noise"):
+        replay([champion, *flags])
+
+
 def test_without_a_display_the_recording_is_beside_the_champion(
     champion, here, capfd, monkeypatch
 ):
-    monkeypatch.setattr(command, "open_viewer", None)
+    monkeypatch.setattr(output, "open_viewer", None)
     assert replay([champion]) == 0
     out, err = capfd.readouterr()
     outcome, line = out.splitlines()
@@ -285,7 +335,7 @@ def test_a_robots_own_trajectory_needs_no_simulation(here):
 def test_a_viewer_opens_where_there_is_a_display(champion, here, monkeypatch, capsys):
     opened = []
     monkeypatch.setenv("DISPLAY", ":0")
-    monkeypatch.setattr(command, "open_viewer", opened.append)
+    monkeypatch.setattr(output, "open_viewer", opened.append)
     assert replay([champion]) == 0
     path = here / "run" / "replay.rrd"
     assert opened == [path]

@@ -19,12 +19,10 @@ from epuck_mj.errors import UserError
 from evolution.replay.__main__ import replay
 from evolution.replay.viewer_picture import headless_viewer, viewer_screenshot
 from tests.browser import MISSING, browser, until
-from tests.processes import python_process
+from tests.processes import PATIENCE, python_process
 
 ROOT = Path(__file__).parent.parent
 CHAMPION = ROOT / "results/paper/de-best/seed-1/champion.json"
-PATIENCE = 120
-"""Seconds for what takes ten on a machine that does nothing else."""
 
 
 @pytest.fixture

@@ -21,14 +21,13 @@ from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.policies.network import Network
 from epuck_mj.show import render
 from epuck_mj.step.control import TaskParameters
-from evolution.replay import __main__ as command
+from evolution.replay import output
 from evolution.replay.__main__ import replay
 from tests.browser import until
+from tests.processes import PATIENCE
 
 ROOT = Path(__file__).parent.parent
 RERUN = Path(sys.executable).with_name("rerun")
-TIMEOUT = 120
-"""Seconds for what takes three on a machine that does nothing else."""
 
 VIEWER_PORT = 9876
 """Where rerun's viewer listens if nobody says otherwise."""
@@ -72,13 +71,13 @@ def process(*argv, code=None):
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
-        timeout=TIMEOUT,
+        timeout=PATIENCE,
     )
 
 
 def verify(path):
     result = subprocess.run(
-        [RERUN, "rrd", "verify", path], capture_output=True, text=True, timeout=60
+        [RERUN, "rrd", "verify", path], capture_output=True, text=True, timeout=PATIENCE
     )
     assert result.returncode == 0, result.stderr
 
@@ -171,8 +170,8 @@ def test_a_window_opens_on_a_display(here, monkeypatch):
                 pytest.skip(f"no Vulkan driver for windows here: {line}")
             assert line == "replay.rrd, in the viewer"
             (viewer,) = viewers(here / "replay.rrd")
-            client = until(_client, TIMEOUT)
-            recording = until(lambda: client.get_state().active_recording, TIMEOUT)
+            client = until(_client, PATIENCE)
+            recording = until(lambda: client.get_state().active_recording, PATIENCE)
             saved = RrdReader(here / "replay.rrd").recordings()[0]
             assert saved.recording_id in str(recording)
             assert viewers(here / "replay.rrd") == [viewer]
@@ -231,8 +230,8 @@ def test_a_picture(here):
 @needs_opengl
 def test_a_video_and_everything_else_at_once(here, monkeypatch, capsys):
     pytest.importorskip("imageio_ffmpeg", reason="the extra 'video' is not installed")
-    monkeypatch.setattr(command, "VIDEO_SIZE", (96, 64))
-    monkeypatch.setattr(command, "IMAGE_SIZE", (96, 64))
+    monkeypatch.setattr(output, "VIDEO_SIZE", (96, 64))
+    monkeypatch.setattr(output, "IMAGE_SIZE", (96, 64))
     everything = ("--save", "a.rrd", "--image", "a.png", "--video", "films/a.mp4")
     assert replay(["champion.json", *everything]) == 0
     said = capsys.readouterr()

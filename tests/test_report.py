@@ -19,6 +19,7 @@ from markdown_it import MarkdownIt
 from scipy import stats
 
 from epuck_mj.errors import UserError
+from evolution.judging.scores import HeldOut
 from evolution.pages.blocks import (
     STYLE,
     Code,
@@ -53,6 +54,7 @@ from evolution.statistics.estimates import rank_correlation
 from evolution.statistics.significance import holm, stars
 from evolution.study.config import seeds_text
 from evolution.study.data import load_study
+from tests.processes import PATIENCE
 from tests.study_on_disk import LEVELS, ROBOTS, history, write_study
 
 NAMES = tuple(LEVELS)
@@ -106,7 +108,7 @@ def test_runs_read_back_exactly(study):
             r for r in study.runs[row["experiment"]] if r.seed == int(row["seed"])
         )
         assert float(row["epuck mean"]) == run.held_out("epuck")
-        assert float(row["stored"]) == run.stored
+        assert float(row["stored"]) == run.scores.stored
         assert int(row["evaluations"]) == 3000
         # a generation that was repeated after a crash counts once
         assert int(row["control_steps"]) == 1900
@@ -241,9 +243,7 @@ def test_successes_by_hand(study):
         if row["criterion"] == MATCHES:
             met = [run.held_out(robot) >= 195 for run in runs]
         else:
-            shares = [
-                run.champion.scores["held_out"][robot]["behaviour"] for run in runs
-            ]
+            shares = [run.scores.held_out[robot].behaviour for run in runs]
             met = [s["wall follower"] + s["hugger"] >= 0.9 for s in shares]
         assert (int(row["successes"]), int(row["n"])) == (sum(met), n)
         bounds = stats.binomtest(sum(met), n).proportion_ci(method="wilson")
@@ -536,7 +536,7 @@ def test_bad_input_is_one_line(kind, tmp_path):
         [sys.executable, "-m", "evolution.report", str(path), *argv],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
     )
     assert result.returncode == 2
     assert result.stdout == ""
@@ -569,9 +569,12 @@ def test_luck_with_noise_is_held_against_starts_with_noise(tmp_path):
     experiment = summary_fields(data, "out", False)["experiments"]["ga"]
     assert experiment["held_out"]["epuck"]["share_of_stored"] is None
     assert experiment["most_believed"] == {"stored": None, "held_out": None}
+    runs = []
     for run in data.runs["ga"]:
-        test = {"mean": run.stored - 7.0, "crash_rate": 0.0}
-        run.champion.scores["held_out_as_evolved"] = {"epuck_planar": test}
+        test = HeldOut(mean=run.scores.stored - 7.0, crash_rate=0.0, starts=1000)
+        tested = {"held_out_as_evolved": {"epuck_planar": test}}
+        runs.append(replace(run, scores=run.scores.model_copy(update=tested)))
+    data = replace(data, runs={**data.runs, "ga": tuple(runs)})
     _, _, _, held_out, found, *believed = row()
     assert held_out[0].isdigit()
     assert found == "7.0 (7.0, 7.0, 7.0)"

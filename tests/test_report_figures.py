@@ -17,6 +17,7 @@ from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.policies.network import Network
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.trials.behaviour_classes import CLASSES
+from evolution.judging.scores import HeldOut, Scores
 from evolution.pages.figure_files import write_figure
 from evolution.pages.style import LOOKS, looks
 from evolution.pages.words import label
@@ -50,6 +51,10 @@ POPULATION = {"de-best": 150, "ga": 100, "my own": 30}
 SHARES = {"crashed": 0.25, "wall follower": 0.5, "no known class": 0.25, "stuck": 0.0}
 
 
+def a_test(mean, behaviour):
+    return HeldOut(mean=mean, crash_rate=0.0, starts=1000, behaviour=behaviour)
+
+
 def a_run(name, seed, robots=ROBOTS, evaluations=30_000):
     rng = np.random.default_rng([seed, POPULATION[name]])
     n = evaluations // POPULATION[name]
@@ -63,15 +68,15 @@ def a_run(name, seed, robots=ROBOTS, evaluations=30_000):
         "std": np.ones(n),
     }
     tests = {
-        robot: {"mean": float(best.max() * rng.uniform(0.3, 1)), "behaviour": SHARES}
+        robot: a_test(float(best.max() * rng.uniform(0.3, 1)), SHARES)
         for robot in robots
     }
-    scores = {"stored": float(best.max()), "held_out": tests}
+    scores = Scores(stored=float(best.max()), held_out=tests)
     genome = rng.uniform(-5, 5, Network().n_genes)
     champion = ControllerFile(
-        Network(), genome, TaskParameters(STEPS), Origin("epuck", "arena"), scores
+        Network(), genome, TaskParameters(STEPS), Origin("epuck", "arena"), {}
     )
-    return RunData(seed, history, champion, Path("nowhere"))
+    return RunData(seed, history, champion, scores, Path("nowhere"))
 
 
 def a_study(n_runs=N_RUNS, robots=ROBOTS, yardstick=True):
@@ -85,7 +90,7 @@ def a_study(n_runs=N_RUNS, robots=ROBOTS, yardstick=True):
         },
         robots=robots,
         steps=STEPS,
-        yardstick={robot: {"mean": 200.0} for robot in robots} if yardstick else {},
+        yardstick=dict.fromkeys(robots, a_test(200.0, {})) if yardstick else {},
         missing=(),
     )
 
@@ -278,10 +283,10 @@ def test_rungs_shows_the_last_robot_against_the_first(data):
 def test_behaviour_shows_mean_shares(data):
     run = data.runs["ga"][0]
     tests = {
-        "epuck_planar": {"mean": 1.0, "behaviour": {"crashed": 1.0}},
-        "epuck": {"mean": 1.0, "behaviour": {"stuck": 1.0}},
+        "epuck_planar": a_test(1.0, {"crashed": 1.0}),
+        "epuck": a_test(1.0, {"stuck": 1.0}),
     }
-    other = replace(run, champion=replace(run.champion, scores={"held_out": tests}))
+    other = replace(run, scores=Scores(stored=1.0, held_out=tests))
     runs = {**data.runs, "ga": (run, other)}
     figure, caption = drawn(behaviour_figure(replace(data, runs=runs)))
     first, second = (
@@ -296,7 +301,7 @@ def test_behaviour_shows_mean_shares(data):
 
 
 def test_behaviour_of_the_yardstick_is_the_last_row(data):
-    yardstick = {robot: {"mean": 1.0, "behaviour": SHARES} for robot in ROBOTS}
+    yardstick = dict.fromkeys(ROBOTS, a_test(1.0, SHARES))
     figure, _ = drawn(behaviour_figure(replace(data, yardstick=yardstick)))
     assert figure.axes[0].get_yticklabels()[-1].get_text() == "hand-written"
 
@@ -364,10 +369,8 @@ def test_every_study_has_its_figures(n_runs, robots, yardstick, monkeypatch):
 
 
 def test_no_behaviour_in_older_runs(data):
-    runs = a_study({"ga": 2}).runs
-    for run in runs["ga"]:
-        for test in run.champion.scores["held_out"].values():
-            del test["behaviour"]
+    older = Scores(stored=1.0, held_out=dict.fromkeys(ROBOTS, a_test(1.0, {})))
+    runs = {"ga": tuple(replace(run, scores=older) for run in data.runs["ga"])}
     assert (
         behaviour_figure(replace(data, configs={"ga": data.configs["ga"]}, runs=runs))
         is None

@@ -53,7 +53,7 @@ def test_a_study_is_sound_and_spent_the_whole_budget(path: Path):
         for run in runs:
             spent = run.history["evaluations"][-1]
             assert 30_000 - 1000 < spent <= 30_000, name
-            assert run.history["best"].max() >= run.stored
+            assert run.history["best"].max() >= run.scores.stored
 
 
 @pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.name)

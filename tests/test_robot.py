@@ -5,12 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.bridge import at_control_steps
 from epuck_mj.bridge.drive.odometry import Odometry
 from epuck_mj.bridge.drive.robot import RealRobot
 from epuck_mj.bridge.drive.schedule import Schedule
 from epuck_mj.bridge.drive.session import Session
-from epuck_mj.bridge.errors import (
+from epuck_mj.bridge.failures import (
     BridgeError,
     LinkLost,
     RobotRestarted,
@@ -20,11 +19,9 @@ from epuck_mj.bridge.errors import (
 from epuck_mj.bridge.fake.builds import BUILDS
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.mujoco_body import MujocoBody
-from epuck_mj.bridge.fake.reference import deviation, nominal, same_times
 from epuck_mj.bridge.fake.scenarios import Fault, random_scenario, scenario
-from epuck_mj.bridge.fake.virtual import VirtualPort, VirtualTime
 from epuck_mj.bridge.language.replies import Cycle, Proximity, Steps, wrapped
-from epuck_mj.bridge.line.connection import Greeting
+from epuck_mj.bridge.line.interfaces import Greeting
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.constants import SPEED_MAX, TRACK, WHEEL_RADIUS, WHEEL_SPEED_MAX
@@ -36,16 +33,13 @@ from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.motors import STEP_ANGLE, actual_rates
 from epuck_mj.step.sensors import sensed_distance
+from tests.bridge_reference import at_control_steps, deviation, nominal, same_times
+from tests.virtual_time import VirtualPort, VirtualTime
 
 TASK = TaskParameters()
 CENTRE = np.zeros(3)
 AT_WALL = np.array([0.44, 0.0, math.pi / 2])
 FULL = np.full(2, WHEEL_SPEED_MAX)
-
-
-@pytest.fixture(scope="module")
-def planar():
-    return load_scene("epuck_planar", "arena")
 
 
 class World:

@@ -36,11 +36,8 @@ from evolution.run.directory import LOCK
 from evolution.run.generation_loop import HISTORY
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import CONFIGS, find_config, load_config
-from tests.processes import python_process
+from tests.processes import PATIENCE, python_process
 from tests.shipped import OPTIMIZERS
-
-TIMEOUT = 120
-"""Seconds for what takes a few on a machine that does nothing else."""
 
 SMALL = ["--steps", "20", "--trials", "2", "--population", "10"]
 SHORT = [*SMALL, "--evaluations", "20"]
@@ -72,7 +69,7 @@ def evolution(cwd: Path, *argv: str, **variables) -> subprocess.CompletedProcess
     """The finished process of a command line."""
     command = ("-m", "evolution.run", *argv)
     with python_process(*command, cwd=cwd, env=os.environ | variables) as process:
-        stdout, stderr = process.communicate(timeout=TIMEOUT)
+        stdout, stderr = process.communicate(timeout=PATIENCE)
     return subprocess.CompletedProcess(argv, process.returncode, stdout, stderr)
 
 
@@ -95,7 +92,7 @@ main(run.run)
 
 def wait_for(process: subprocess.Popen, moment: Callable[[], bool]) -> None:
     """Wait until then, or until the process has ended."""
-    deadline = time.monotonic() + TIMEOUT
+    deadline = time.monotonic() + PATIENCE
     while not moment() and process.poll() is None:
         assert time.monotonic() < deadline
         time.sleep(0.005)
@@ -698,7 +695,7 @@ def test_a_signal_ends_the_run_and_says_how_to_resume(
     with python_process("-c", UNHURRIED, *argv, cwd=tmp_path) as process:
         wait_for(process, lambda: n_rows(directory) >= generations)
         process.send_signal(signum)
-        stdout, stderr = process.communicate(timeout=TIMEOUT)
+        stdout, stderr = process.communicate(timeout=PATIENCE)
     assert process.returncode == status, stderr
     assert stdout == ""
     assert "Traceback" not in stderr
@@ -734,7 +731,7 @@ def test_kill_9_at_any_moment_loses_at_most_one_generation(reference, tmp_path):
             wait_for(process, moment)
             time.sleep(random.uniform(0, 0.2))
             process.kill()
-            _, stderr = process.communicate(timeout=TIMEOUT)
+            _, stderr = process.communicate(timeout=PATIENCE)
         assert process.returncode in (-signal.SIGKILL, 0), stderr
         records = n_records(directory)
         announced = [int(each) for each in re.findall(r"gen=(\d+)", stderr)]
@@ -869,7 +866,7 @@ def test_a_second_ctrl_c_changes_nothing(moment, tmp_path):
     code = TWICE.replace("MOMENT", repr(moment))
     argv = ["ga", *TINY, "--output", "run"]
     with python_process("-c", code, *argv, cwd=tmp_path) as process:
-        _, stderr = process.communicate(timeout=TIMEOUT)
+        _, stderr = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert resume_command(stderr) == ["--resume", "run"]
     assert "Traceback" not in stderr

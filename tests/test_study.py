@@ -23,16 +23,13 @@ from evolution.judging.held_out import Judge
 from evolution.run import execution, results
 from evolution.run.__main__ import run
 from evolution.run.directory import LOCK, RunDirectory
-from evolution.run.execution import Means
+from evolution.run.means import Means
 from evolution.settings.config_files import load_config
 from evolution.study import __main__ as module
 from evolution.study import jobs
 from evolution.study.__main__ import study
 from evolution.study.jobs import Event, Job, carry_out, failure_log, failure_of
-from tests.processes import python_process
-
-TIMEOUT = 120
-"""Seconds for what takes a few on a machine that does nothing else."""
+from tests.processes import PATIENCE, python_process
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
@@ -157,12 +154,12 @@ def carried(monkeypatch) -> Carried:
 
 def finish(cwd: Path, *command: str) -> subprocess.CompletedProcess[str]:
     with python_process(*command, cwd=cwd) as process:
-        stdout, stderr = process.communicate(timeout=TIMEOUT)
+        stdout, stderr = process.communicate(timeout=PATIENCE)
     return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
 
 
 def wait_for(moment: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + TIMEOUT
+    deadline = time.monotonic() + PATIENCE
     while not moment():
         assert time.monotonic() < deadline
         time.sleep(0.01)
@@ -417,7 +414,7 @@ def test_a_run_killed_alone_is_reported_and_the_next_call_completes_it(
         wait_for(lambda: n_records(one) > 2)
         (victim,) = run_processes(process.pid)
         os.kill(victim, signal.SIGKILL)
-        stdout, stderr = process.communicate(timeout=TIMEOUT)
+        stdout, stderr = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     assert stderr.splitlines() == [
         "one seed 1 failed: its process was killed by SIGKILL",
@@ -483,7 +480,7 @@ def test_a_signal_ends_all_and_says_how_to_go_on(
 ):
     with interrupted(here, seeds) as (process, children, typed):
         send(process.pid, signum)
-        stdout, stderr = process.communicate(timeout=TIMEOUT)
+        stdout, stderr = process.communicate(timeout=PATIENCE)
         assert not any(map(command_line, children))
     assert process.returncode == status
     assert stdout == ""
@@ -501,7 +498,7 @@ def test_runs_end_when_their_study_is_killed(here, carried, reference):
     with interrupted(here, SEEDS) as (process, children, typed):
         process.kill()
         wait_for(lambda: not any(map(command_line, children)))
-        _, stderr = process.communicate(timeout=TIMEOUT)
+        _, stderr = process.communicate(timeout=PATIENCE)
     assert process.returncode == -signal.SIGKILL
     assert stderr == ""
     assert_completed(here, typed, SEEDS, reference)
@@ -520,7 +517,7 @@ with FileLock(sys.argv[1]):
 
 
 @contextmanager
-def held(directory: Path, seconds: float = TIMEOUT) -> Iterator[subprocess.Popen[str]]:
+def held(directory: Path, seconds: float = PATIENCE) -> Iterator[subprocess.Popen[str]]:
     """Another process works in the directory for so long."""
     arguments = (str(directory / LOCK), str(seconds))
     with python_process("-c", HOLD, *arguments, cwd=directory) as process:
@@ -552,12 +549,12 @@ def test_a_second_process_in_a_run_directory_gets_one_line(here, carried, monkey
         assert written(directory) == before
         # however it ends, the directory is free
         process.kill()
-        process.wait(TIMEOUT)
+        process.wait(PATIENCE)
         assert run(["--resume", "run"]) == 0
 
 
 def test_a_process_about_to_leave_is_waited_for(tmp_path):
-    with held(tmp_path, 0.3), RunDirectory(tmp_path).locked(patience=TIMEOUT):
+    with held(tmp_path, 0.3), RunDirectory(tmp_path).locked(patience=PATIENCE):
         pass
 
 

@@ -15,6 +15,7 @@ from evolution.run.directory import locked
 from evolution.settings.config_files import find_config, load_config
 from evolution.study.config import StudyConfig, find_study, parse_seeds
 from evolution.study.directory import StudyDirectory
+from tests.processes import PATIENCE
 from tests.shipped import OPTIMIZERS
 
 SHIPPED = ("paper", "quick", "wheels")
@@ -279,7 +280,7 @@ def test_two_that_open_a_study_at_once_both_have_their_say(here):
             time.sleep(0.2)
             assert not any(each.done() for each in both)
         for each in both:
-            each.result(timeout=30)
+            each.result(timeout=PATIENCE)
     assert set(directory.stored_config().experiments) == {"ga", "de-best"}
     assert directory.asked_seeds() == {"ga": [1], "de-best": [2]}
 

@@ -10,18 +10,21 @@ import sys
 import numpy as np
 import pytest
 
-from epuck_mj import view
 from epuck_mj.errors import UserError
 from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.disturbed import disturbed
+from epuck_mj.rungs.single import WatchedRobot
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import TaskParameters, drive
 from epuck_mj.trials.recorder import record
+from epuck_mj.view import __main__ as view
+from epuck_mj.view import window as windows
+from tests.processes import PATIENCE
 
 TASK = TaskParameters(steps=120)
 
@@ -47,7 +50,7 @@ def champion(tmp_path):
 @pytest.mark.parametrize("noise", ["none", "strong"])
 def test_a_trial_is_the_one_that_record_gives(robot, policy, noise):
     scene = load_scene(robot, "pillars")
-    watched = view.WatchedRobot(scene)
+    watched = WatchedRobot(scene)
     # one robot for all trials: a reset leaves nothing of the one before
     starts = FreeSpace(scene, 0.01).sample(np.random.default_rng(0), 4)
     conditions = Conditions(noise, randomise=noise != "none")
@@ -84,14 +87,14 @@ class FakeWindow:
 
 
 def test_trials_follow_each_other_until_the_window_is_closed(monkeypatch):
-    monkeypatch.setattr(view.time, "sleep", lambda seconds: None)
+    monkeypatch.setattr(windows.time, "sleep", lambda seconds: None)
     scene, start = load_scene("epuck_planar", "arena"), np.array([0.4, 0, 0])
     task = TaskParameters(steps=20)
     expected = record(scene, straight_on, start, task)
     assert expected.crashed
-    window, robot = FakeWindow(400), view.WatchedRobot(scene)
+    window, robot = FakeWindow(400), WatchedRobot(scene)
     starts = itertools.repeat(start)
-    lines = list(view.watch(window, robot, straight_on, starts, task))
+    lines = list(windows.watch(window, robot, straight_on, starts, task))
     # a crash ends a trial, and the same start gives the same trial again
     pictures = expected.steps * scene.n_substeps + 1
     # the last was not over when the window was closed
@@ -111,9 +114,9 @@ def test_simulated_time_is_real_time(monkeypatch):
         nonlocal now
         now += seconds
 
-    monkeypatch.setattr(view.time, "perf_counter", lambda: now)
-    monkeypatch.setattr(view.time, "sleep", sleep)
-    clock = view.Clock()
+    monkeypatch.setattr(windows.time, "perf_counter", lambda: now)
+    monkeypatch.setattr(windows.time, "sleep", sleep)
+    clock = windows.Clock()
     for work in (0.0, 0.004, 0.015, 0.0):
         now += work
         clock.wait(0.01)
@@ -130,7 +133,7 @@ def run(*arguments, **environment):
         [sys.executable, "-m", "epuck_mj.view", *map(str, arguments)],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
         cwd=MODELS.parent,
         env={**os.environ, "DISPLAY": "", "WAYLAND_DISPLAY": "", **environment},
     )
@@ -190,10 +193,10 @@ def display():
 
 WINDOW = """
 import sys
-from epuck_mj import view
+from epuck_mj.view import __main__ as view, window as windows
 from epuck_mj.host.command_line import main
 
-open_window = view.open_window
+open_window = windows.open_window
 def closing(model, data):
     with open_window(model, data) as window:
         frames = 0
@@ -206,7 +209,7 @@ def closing(model, data):
                 window.close()
         window.sync = counted
         yield window
-view.open_window = __import__("contextlib").contextmanager(closing)
+windows.open_window = __import__("contextlib").contextmanager(closing)
 main(view.run)
 """
 
@@ -216,7 +219,7 @@ def test_a_window_opens_shows_the_robot_and_closes(display, champion):
         [sys.executable, "-c", WINDOW, "arena", str(champion), "--seconds", "0.1"],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
         cwd=MODELS.parent,
         env={**os.environ, "DISPLAY": display},
     )
@@ -242,7 +245,7 @@ def test_ctrl_c_ends_it_without_a_word(display):
     assert process.stdout is not None
     line = process.stdout.readline()
     process.send_signal(2)
-    _, errors = process.communicate(timeout=30)
+    _, errors = process.communicate(timeout=PATIENCE)
     if "cannot open a window" in errors:
         pytest.skip(f"no OpenGL on Xvfb: {errors}")
     assert line.startswith("trial 1: ")
@@ -253,11 +256,11 @@ def test_without_glfw_one_line_says_so(monkeypatch):
     def missing(name):
         raise ImportError(f"no {name}")
 
-    monkeypatch.setattr(view.importlib, "import_module", missing)
+    monkeypatch.setattr(windows.importlib, "import_module", missing)
     scene = load_scene("epuck_planar", "arena")
-    robot = view.WatchedRobot(scene)
+    robot = WatchedRobot(scene)
     with (
         pytest.raises(UserError, match="cannot open a window"),
-        view.open_window(robot.model, robot.data),
+        windows.open_window(robot.model, robot.data),
     ):
         pass

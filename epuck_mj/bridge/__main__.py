@@ -8,8 +8,6 @@ from pathlib import Path
 
 import tyro
 
-from epuck_mj.bridge.drive.log import log_name
-from epuck_mj.bridge.drive.mission import Mission, accomplish
 from epuck_mj.bridge.line.connect import connect
 from epuck_mj.bridge.line.serial_port import ports
 from epuck_mj.constants import SPEED_MAX
@@ -17,7 +15,6 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse
 from epuck_mj.policies.file import load
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
-from epuck_mj.scene.model import load_scene
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import Policy, TaskParameters
 
@@ -69,8 +66,13 @@ def bridge(argv: Sequence[str]) -> int:
         for name, description in ports():
             print(f"{name}  {description}")
         return 0
-    _check(options)
+    _refuse_bad_options(options)
     policy, task, robot, arena = _champion(options.champion)
+    # physics and pictures are not for those who only ask for help
+    from epuck_mj.bridge.drive.log import log_name
+    from epuck_mj.bridge.drive.mission import Mission, accomplish
+    from epuck_mj.scene.model import load_scene
+
     calibration = options.calibration
     x, y, degrees = options.pose
     mission = Mission(
@@ -88,7 +90,7 @@ def bridge(argv: Sequence[str]) -> int:
     return accomplish(mission, lambda: connect(options.port), time.monotonic)
 
 
-def _check(options: Options) -> None:
+def _refuse_bad_options(options: Options) -> None:
     if not options.champion:
         raise UserError(f"expected a controller file or {YARDSTICK}")
     if not options.port:

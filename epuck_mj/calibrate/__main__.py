@@ -7,12 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from epuck_mj.bridge.drive.mission import DONE, FAILED, RUNAWAY
-from epuck_mj.bridge.errors import BridgeError, StillMoving
+from epuck_mj.bridge.failures import (
+    DONE,
+    FAILED,
+    RUNAWAY,
+    BridgeError,
+    StillMoving,
+)
 from epuck_mj.bridge.line.connect import connect
-from epuck_mj.bridge.line.connection import Clock, Connection
+from epuck_mj.bridge.line.interfaces import Connection
+from epuck_mj.calibrate.bench import Bench
 from epuck_mj.calibrate.guide import STEPS, Person
-from epuck_mj.calibrate.measure import Bench
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse
 from epuck_mj.host.files import check_writable, is_file
@@ -53,15 +58,15 @@ def calibrate(argv: Sequence[str], ask: Callable[[str], str] = input) -> int:
     if not options.port:
         raise UserError("expected --port, as for python -m epuck_mj.bridge")
     steps = tuple(STEPS) if options.only is None else (options.only,)
-    return accomplish(steps, options.output, lambda: connect(options.port), ask)
+    return calibrate_robot(steps, options.output, lambda: connect(options.port), ask)
 
 
-def accomplish(
+def calibrate_robot(
     steps: Sequence[str],
     output: Path,
     connect: Callable[[], Connection],
     ask: Callable[[str], str],
-    clock: Clock = time.monotonic,
+    clock: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> int:
     """Calibrate, writing the file after each step; the exit status, as the bridge's.

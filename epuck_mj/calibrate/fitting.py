@@ -16,13 +16,16 @@ from epuck_mj.step.sensors import proximity
 
 RADII = (0.015, 0.025)
 TRACKS = (0.045, 0.065)
-"""From where to where e-pucks have them [m]. Chosen: 20 % and more beyond any known."""
+"""Radii and tracks that e-pucks can have [m].
+
+Chosen: 20 % and more beyond any known.
+"""
 
 GAINS = (0.2, 5.0)
-"""The same of the sensors' gains. Chosen: known ones are 0.6 to 1.5."""
+"""Gains that sensors can have. Chosen: known ones are 0.6 to 1.5."""
 
 SIDES = ("left", "right")
-"""Of the wheels, in their order."""
+"""The wheels in their order."""
 
 SATURATED = 3700
 """Counts from which a sensor says nothing of the distance.
@@ -40,7 +43,7 @@ The ray is less than 0.1 mm longer at its ends, at a clearance of 30 mm.
 """
 
 N_READINGS = 3
-"""Fewest readings in such a window."""
+"""Fewest readings in a window."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +80,7 @@ def peaks(yaw: np.ndarray, counts: np.ndarray) -> np.ndarray:
     Raises:
         UserError: if readings are too far apart, or a sensor sees something everywhere.
     """
-    _check_floor(np.median(counts, axis=0))
+    _refuse_high_floor(np.median(counts, axis=0))
     first, last = yaw.min() + WINDOW / 2, yaw.max() - WINDOW / 2
     windows = [np.abs(yaw - middle) <= WINDOW / 2 for middle in yaw]
     medians = [
@@ -121,14 +124,14 @@ def fit_gains(clearances: np.ndarray, counts: np.ndarray) -> SensorFit:
     left = np.where(used, logs - fitted, 0.0)
     gains = np.exp(fitted)
     for number, gain in enumerate(gains):
-        _check(f"the gain of ps{number}", float(gain), GAINS, "")
+        _refuse_outside(f"the gain of ps{number}", float(gain), GAINS, "")
     return SensorFit(gains, np.sqrt((left**2).sum(axis=0) / n_used), used)
 
 
 def fit_wheel_radii(
     steps: float, forward: float, left: float, track: float
 ) -> tuple[float, float]:
-    """On which the robot rolls, left and right [m]: wheels that differ drive an arc.
+    """Radii on which the robot rolls, left and right [m]: if they differ, on an arc.
 
     The front, which is what a person sees, is a body's radius ahead of the axle: if the
     robot turned by `a`, it lies `tan(a / 2) = left / (forward + 2 BODY_RADIUS)` aside.
@@ -136,7 +139,7 @@ def fit_wheel_radii(
     Args:
         steps: that each motor made.
         forward: from where the front was to where it is, straight on [m].
-        left: the same to the left of straight on [m].
+        left: how far its front is to the left of straight on [m].
         track: effective distance of the wheels [m].
 
     Raises:
@@ -148,19 +151,19 @@ def fit_wheel_radii(
     arc = chord / np.sinc(turn / (2 * np.pi))
     angle = steps * STEP_ANGLE
     wheels = [float(arc + side * turn * track / 2) / angle for side in (-1, 1)]
-    check_wheel_radii(wheels)
-    return wheels[0], wheels[1]
+    return checked_wheel_radii(wheels)
 
 
-def check_wheel_radii(radii: Sequence[float]) -> None:
-    """Nothing, if an e-puck can have wheels of such radii [m].
+def checked_wheel_radii(radii: Sequence[float]) -> tuple[float, float]:
+    """Radii of the left and the right wheel [m] as given, if an e-puck can have them.
 
     Raises:
         UserError: if not.
     """
     for name, radius in zip(SIDES, radii, strict=True):
         what = f"a radius of the {name} wheel"
-        _check(what, 1000 * radius, _millimetres(RADII), " mm")
+        _refuse_outside(what, 1000 * radius, _millimetres(RADII), " mm")
+    return radii[0], radii[1]
 
 
 def fit_track(steps: float, wheel_radius: float, angle: float) -> float:
@@ -177,11 +180,13 @@ def fit_track(steps: float, wheel_radius: float, angle: float) -> float:
     if angle <= 0:
         raise UserError(f"expected a turn to the left, got {math.degrees(angle):.0f}")
     track = 2 * steps * STEP_ANGLE * wheel_radius / angle
-    _check("a track", 1000 * track, _millimetres(TRACKS), " mm")
+    _refuse_outside("a track", 1000 * track, _millimetres(TRACKS), " mm")
     return track
 
 
-def _check(what: str, value: float, limits: tuple[float, float], unit: str) -> None:
+def _refuse_outside(
+    what: str, value: float, limits: tuple[float, float], unit: str
+) -> None:
     low, high = limits
     if not low <= value <= high:
         raise UserError(
@@ -190,7 +195,7 @@ def _check(what: str, value: float, limits: tuple[float, float], unit: str) -> N
         )
 
 
-def _check_floor(floor: np.ndarray) -> None:
+def _refuse_high_floor(floor: np.ndarray) -> None:
     """Refuse sensors that see something where there is nothing."""
     if floor.max() > FLOOR_MAX:
         raise UserError(

@@ -6,18 +6,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from epuck_mj.calibrate import measure
+from epuck_mj.calibrate.bench import (
+    N_STEPS,
+    N_TURNS,
+    Bench,
+    drive_straight,
+    look_around,
+    turn_on_the_spot,
+    zero,
+)
 from epuck_mj.calibrate.fitting import (
     SATURATED,
     SIDES,
     SensorFit,
-    check_wheel_radii,
+    checked_wheel_radii,
     fit_gains,
     fit_track,
     fit_wheel_radii,
     peaks,
 )
-from epuck_mj.calibrate.measure import Bench
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import Interruption
@@ -25,26 +32,26 @@ from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.motors import STEP_ANGLE
 
 CLEARANCES = (0.010, 0.020, 0.030)
-"""Between shell and wall [m]: where sensors are good, and do not saturate."""
+"""Clearances from shell to wall [m], where sensors are good, and do not saturate."""
 
 RESIDUAL_MAX = 0.25
-"""A sensor that deviates more from the curve is worth a word. Chosen."""
+"""Residual above which a sensor is worth a word. Chosen."""
 
 LENGTHS = (0.05, 2.0)
-"""What a ruler can have shown [m]; others are taken for slips of the pen."""
+"""Ways that a ruler can have shown [m]; others are taken for slips of the pen."""
 
 DRIFTS = (-150.0, 150.0)
-"""The same to the left [mm]: wheels that differ by 5 %."""
+"""Ways to the left that a ruler can have shown [mm]: wheels that differ by 5 %."""
 
 MISSES = (-360.0, 360.0)
-"""The same of a protractor [degrees]."""
+"""Angles that a protractor can have shown [degrees]."""
 
 
 class Person:
     """Who is at the robot."""
 
     def __init__(self, ask: Callable[[str], str], interruption: Interruption) -> None:
-        """Nothing is asked yet.
+        """A person who was asked nothing yet.
 
         Args:
             ask: shows a question and gives the answer, as `input` does.
@@ -62,7 +69,7 @@ class Person:
         self._answer(f"{what}\nThen press Enter: ")
 
     def agrees(self, question: str) -> bool:
-        """Yes or no.
+        """Whether the person says yes; asked again until it is yes or no.
 
         Raises:
             UserError: if nobody answers any more.
@@ -102,16 +109,18 @@ class Person:
             ) from None
 
 
-def straight(bench: Bench, person: Person, known: Calibration) -> Calibration:
-    """With the wheel radii by a ruler."""
+def measure_wheel_radii(
+    bench: Bench, person: Person, known: Calibration
+) -> Calibration:
+    """What is known, with the wheel radii by a ruler."""
     step_length = STEP_ANGLE * known.wheel_radius
     _say("\nWheel radii: the robot drives straight on, you measure where it gets.")
-    clear = measure.N_STEPS * step_length + 0.15
+    clear = N_STEPS * step_length + 0.15
     person.ready(
         "Mark where its front is, and a line from there to where it points;\n"
         f"leave {clear:.1f} m clear before it, 0.2 m to each side."
     )
-    steps = measure.straight(bench, known)
+    steps = drive_straight(bench, known)
     _say(f"It stands. Each wheel made {steps:.0f} steps.")
     forward = person.number("How far did its front get, in metres", *LENGTHS)
     _say("By how many millimetres is its front off the line?")
@@ -121,37 +130,38 @@ def straight(bench: Bench, person: Person, known: Calibration) -> Calibration:
     return replace(known, wheel_radii=radii)
 
 
-def turn(bench: Bench, person: Person, known: Calibration) -> Calibration:
-    """With the track by a protractor."""
+def measure_track(bench: Bench, person: Person, known: Calibration) -> Calibration:
+    """What is known, with the track by a protractor."""
     _say(
-        f"\nTrack: the robot turns {measure.N_TURNS} times to the left, on the spot;\n"
+        f"\nTrack: the robot turns {N_TURNS} times to the left, on the spot;\n"
         "you measure by how much its front misses where it was."
     )
     person.ready("Mark where its front points; leave 5 cm clear around it.")
-    steps = measure.turn(bench, known)
+    steps = turn_on_the_spot(bench, known)
     _say(f"It stands. Each wheel made {steps:.0f} steps.")
     _say("By how many degrees does its front miss the mark?")
     miss = person.number("Too far is above 0, not far enough is below 0", *MISSES)
-    angle = 2 * math.pi * measure.N_TURNS + math.radians(miss)
+    angle = 2 * math.pi * N_TURNS + math.radians(miss)
     mean = known.wheel_radius
     track = fit_track(steps, mean, angle)
     _say(f"track {1000 * track:.2f} mm; before {1000 * known.track:.2f}")
     # on the arc that was measured, wheels farther apart differ by more
     wider = track / known.track
-    radii = tuple(mean + (radius - mean) * wider for radius in known.wheel_radii)
-    check_wheel_radii(radii)
+    radii = checked_wheel_radii(
+        [mean + (radius - mean) * wider for radius in known.wheel_radii]
+    )
     if radii != known.wheel_radii:
         _say_radii(radii, known)
     return replace(known, track=track, wheel_radii=radii)
 
 
-def sensors(bench: Bench, person: Person, known: Calibration) -> Calibration:
-    """With the gains of the proximity sensors."""
+def measure_gains(bench: Bench, person: Person, known: Calibration) -> Calibration:
+    """What is known, with the gains of the proximity sensors."""
     _say("\nSensors: the robot turns slowly on the spot, at several distances")
     _say("from a flat wall which is 20 cm long or longer.")
     if person.agrees("Set the sensors' zero? They forget it when switched off"):
         person.ready("Leave 20 cm clear around it.")
-        measure.zero(bench, known)
+        zero(bench, known)
         _say("The zero is set.")
     rows = []
     for clearance in CLEARANCES:
@@ -159,7 +169,7 @@ def sensors(bench: Bench, person: Person, known: Calibration) -> Calibration:
             f"Put it to the wall, {1000 * clearance:.0f} mm of air between shell and "
             "wall;\ntake the spacer away, leave 20 cm clear elsewhere."
         )
-        rows.append(peaks(*measure.look_around(bench, known)))
+        rows.append(peaks(*look_around(bench, known)))
         _say("It stands.")
     counts = np.array(rows)
     fit = fit_gains(np.array(CLEARANCES), counts)
@@ -205,5 +215,9 @@ def _say(text: str) -> None:
     print(text, flush=True)
 
 
-STEPS = {"straight": straight, "turn": turn, "sensors": sensors}
-"""In the order in which each is of use to the next."""
+STEPS = {
+    "straight": measure_wheel_radii,
+    "turn": measure_track,
+    "sensors": measure_gains,
+}
+"""The steps of a calibration, in the order in which each is of use to the next."""

@@ -10,11 +10,8 @@ from pathlib import Path
 
 import tyro
 
-from epuck_mj.check import check_arena, report
-from epuck_mj.check.picture import region_figure
 from epuck_mj.host.command_line import main, parse
 from epuck_mj.scene.model_files import SHIPPED_ROBOTS
-from epuck_mj.show.pictures import save_figure
 
 
 @dataclass(frozen=True)
@@ -39,11 +36,18 @@ def run(argv: Sequence[str]) -> int:
         UserError: if there is no arena to look at, or no place for the picture.
     """
     options = parse(Options, "python -m epuck_mj.check", argv)
+    # physics and pictures are for a command that makes sense
+    from epuck_mj.check import report
+    from epuck_mj.check.arena import check_arena
+
     shipped = [Path(name).stem for name in SHIPPED_ROBOTS]
     checked = check_arena(options.arena, [options.robot] if options.robot else shipped)
     for line in report.lines(checked.arena, checked.findings):
         print(line)
     if options.picture and checked.scene and checked.grid:
+        from epuck_mj.check.picture import region_figure
+        from epuck_mj.show.pictures import save_figure
+
         figure = region_figure(checked.scene, checked.grid, checked.arena.stem)
         save_figure(figure, options.picture, dpi=120)
         print(f"picture: {options.picture}")

@@ -64,7 +64,7 @@ class ControllerFile:
         genome: its weights, `(genes,)`.
         task: what its trials were.
         origin: where it was evolved; `scene` in the JSON.
-        scores: stored and held-out fitness, and how each was measured.
+        scores: what is known of its worth, as the file says it.
     """
 
     network: Network
@@ -80,11 +80,13 @@ class ControllerFile:
 
     def to_json(self) -> str:
         """The file's text; the genome comes back bit for bit."""
+        # what is not known is left out
+        origin = {k: v for k, v in asdict(self.origin).items() if v is not None}
         fields = {
             "format": FORMAT,
             "network": asdict(self.network),
             "task": asdict(self.task),
-            "scene": asdict(self.origin),
+            "scene": origin,
             "scores": self.scores,
             "genome": [float(gene) for gene in self.genome],
         }

@@ -12,6 +12,9 @@ MODELS = next(
 )
 
 SHIPPED_ROBOTS = ("epuck.xml", "epuck_planar.xml")
+WHEELED_ROBOT, PLANAR_ROBOT = "epuck", "epuck_planar"
+"""Every champion is reported on the first, whatever it was evolved on, and what was
+evolved on it on the second as well."""
 
 
 def absolute(name: str) -> str:

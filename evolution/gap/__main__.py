@@ -13,12 +13,12 @@ from tqdm import tqdm
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import check_threads, main, parse
 from epuck_mj.host.files import check_writable, write_text, writing
+from epuck_mj.scene.model_files import PLANAR_ROBOT, WHEELED_ROBOT
 from evolution.gap.gap_document import gap_document, gap_summary
 from evolution.gap.groups import experiments, peers
 from evolution.gap.outcomes import Outcome, abroad, ideal
 from evolution.gap.transfer import Transfer, verdict
 from evolution.gap.worlds import World, worlds
-from evolution.judging.held_out import PLANAR_ROBOT, WHEELED_ROBOT
 from evolution.named_policies import NamedPolicy, named_policies
 from evolution.pages.blocks import to_markdown
 from evolution.pages.csv_text import csv_text

@@ -3,15 +3,14 @@
 The numbers that a study reports.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cache
+from pathlib import Path
 
 import numpy as np
 
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.model_files import PLANAR_ROBOT, WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.scene.wall_loops import wall_loops
 from epuck_mj.step.control import Everybody, Policy, TaskParameters
@@ -20,67 +19,13 @@ from epuck_mj.trials.behaviour_classes import class_shares
 from epuck_mj.trials.metrics import behaviour
 from epuck_mj.trials.recorder import record_tracks
 from evolution.judging.evaluation import CAPACITY
+from evolution.judging.scores import HeldOut
 from evolution.judging.starts import N_TEST, starts_for_test
 from evolution.settings.setting import Setting
 from evolution.statistics.estimates import mean_interval, worst_share_mean
 
-WHEELED_ROBOT, PLANAR_ROBOT = "epuck", "epuck_planar"
-"""Every champion is reported on the first, whatever it was evolved on, and what was
-evolved on it on the second as well."""
-
 INTERVAL_SEED = 0
 """Of the bootstrap's resamples, so that the same trials give the same interval."""
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """A controller on `starts` fresh starts.
-
-    Attributes:
-        mean: fitness over the starts.
-        standard_deviation: of the fitness of a start.
-        interval: bootstrap 95 % confidence bounds of the mean.
-        worst: mean of the worst 5 % of the starts.
-        crash_rate: share of the trials that ended in a crash.
-        collisions_per_minute: crashes per minute lived.
-        starts: how many there were.
-        behaviour: share of the trials by behaviour class.
-        metrics: mean of each of `trials.metrics.Behaviour` over the trials that have
-            it, None if none has.
-    """
-
-    mean: float
-    standard_deviation: float
-    interval: tuple[float, float]
-    worst: float
-    crash_rate: float
-    collisions_per_minute: float
-    starts: int
-    behaviour: Mapping[str, float]
-    metrics: Mapping[str, float | None]
-
-
-Judging = Callable[[str, Setting], "Judge"]
-"""Gives the judge of a robot in a setting."""
-
-
-def judging(threads: int = 0) -> Judging:
-    """Gives the judge of a robot in a setting, the same one again: they take a second.
-
-    Args:
-        threads: that step the robots; 0 is one per core.
-
-    Returns:
-        A function of robot and setting.
-    """
-
-    @cache
-    def judge(robot: str, setting: Setting) -> Judge:
-        task = setting.task
-        scene = load_scene(robot, setting.arena, task.control_step)
-        return Judge(scene, task, setting.start_clearance, threads)
-
-    return judge
 
 
 def tested_on(robot: str) -> list[str]:
@@ -89,30 +34,67 @@ def tested_on(robot: str) -> list[str]:
     return list(dict.fromkeys([robot, other]))
 
 
+class Judges:
+    """The judge of each robot in each setting, made by the first who asks."""
+
+    def __init__(self, threads: int = 0):
+        """Make none yet; `threads` step the robots, 0 is one per core."""
+        self._threads = threads
+        self._made: dict[tuple[str, Setting], Judge] = {}
+
+    def add(self, robot: str, setting: Setting, scene: Scene, space: FreeSpace) -> None:
+        """Make a judge of what is there already.
+
+        Args:
+            robot: name or path of the robot.
+            setting: in what it is tested.
+            scene: that robot in that setting's arena.
+            space: where it may start.
+        """
+        judge = Judge(scene, space, setting.task, self._threads)
+        self._made[robot, setting] = judge
+
+    def of(self, robot: str, setting: Setting) -> "Judge":
+        """The judge of a robot, a name or a path, in a setting.
+
+        Raises:
+            UserError: if the robot cannot use the arena, the arena has no room, or a
+                wall of which no clearance can be measured.
+        """
+        if (robot, setting) not in self._made:
+            scene = load_scene(robot, setting.arena, setting.task.control_step)
+            space = FreeSpace(scene, setting.start_clearance)
+            self.add(robot, setting, scene, space)
+        return self._made[robot, setting]
+
+    def tested_on(self, robot: str, setting: Setting) -> dict[str, "Judge"]:
+        """The judges of a robot's champions by robot: its own first.
+
+        Raises:
+            UserError: as `of`.
+        """
+        return {Path(each).name: self.of(each, setting) for each in tested_on(robot)}
+
+
 class Judge:
     """Tests controllers in one scene."""
 
     def __init__(
-        self,
-        scene: Scene,
-        task: TaskParameters,
-        start_clearance: float,
-        threads: int = 0,
+        self, scene: Scene, space: FreeSpace, task: TaskParameters, threads: int = 0
     ):
         """Measure the arena.
 
         Args:
             scene: robot and arena.
+            space: where the robot may start.
             task: what a trial is.
-            start_clearance: least distance from the shell to a wall at a start [m].
             threads: that step the robots; 0 is one per core.
 
         Raises:
-            UserError: if the arena has no room, or a wall of which no clearance can be
-                measured.
+            UserError: if the arena has a wall of which no clearance can be measured.
         """
         self.scene = scene
-        self._space = FreeSpace(scene, start_clearance)
+        self._space = space
         self._task = task
         self._threads = threads
         self._probe = ClearanceProbe(scene, threads)

@@ -3,12 +3,16 @@
 Both sets are fixed, the same for all runs, and never used in evolution.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.disturbances import Disturbances
 from evolution.settings.randomness import Purpose, disturbances, random_generator
+
+if TYPE_CHECKING:
+    from epuck_mj.scene.starts import FreeSpace
 
 HELD_OUT_SEED = 0
 """Seed of validation and test starts: no run's seed reaches their streams."""
@@ -18,13 +22,13 @@ N_VALIDATION = 200
 N_TEST = 1000
 
 
-def starts_for_validation(space: FreeSpace) -> np.ndarray:
+def starts_for_validation(space: "FreeSpace") -> np.ndarray:
     """The starts on which champions are chosen, `(200, 3)`."""
     rng = random_generator(HELD_OUT_SEED, Purpose.VALIDATION)
     return space.sample(rng, N_VALIDATION)
 
 
-def starts_for_test(space: FreeSpace, n: int = N_TEST) -> np.ndarray:
+def starts_for_test(space: "FreeSpace", n: int = N_TEST) -> np.ndarray:
     """The first `n` of the starts on which champions are reported, `(n, 3)`."""
     return space.sample(random_generator(HELD_OUT_SEED, Purpose.TEST), n)
 

@@ -82,8 +82,8 @@ def between(interval: Interval, form: str = ".2f") -> str:
 
 
 def percent(share: float | None) -> str:
-    """A share in percent."""
-    return NOTHING if share is None else f"{share:.1%}"
+    """A share in percent; None and nan are not known."""
+    return NOTHING if share is None or math.isnan(share) else f"{share:.1%}"
 
 
 def percent_median(shares: np.ndarray) -> str:

@@ -1,97 +1,22 @@
 """What is replayed: trials of policies on starts, and trajectories from files."""
 
-import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 
 from epuck_mj.errors import UserError
 from epuck_mj.scene.model import Scene
-from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.show.recording import Trial
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import TaskParameters
-from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.trials.recorder import record_trajectories
 from epuck_mj.trials.trajectory import Trajectory
-from evolution.judging.starts import (
-    N_TEST,
-    N_VALIDATION,
-    held_out_disturbances,
-    starts_for_test,
-    starts_for_validation,
-)
 from evolution.named_policies import NamedPolicy
-from evolution.settings.randomness import Purpose
+from evolution.replay.starts import Starts
 
 TRIALS_MAX = 50
 """Most trials of one recording: nobody could tell more apart."""
-
-
-@dataclass(frozen=True)
-class Starts:
-    """Starts that trials begin from.
-
-    Attributes:
-        names: of each, `n` of them.
-        poses: `(n, 3)`: x, y [m], yaw [rad].
-        purpose: of the held-out starts that they are among.
-        total: how many of these there are.
-        first: number of the first among them.
-    """
-
-    names: tuple[str, ...]
-    poses: np.ndarray
-    purpose: Purpose = Purpose.TEST
-    total: int = N_TEST
-    first: int = 0
-
-    @classmethod
-    def none(cls) -> Self:
-        """No starts, for recorded trajectories."""
-        return cls((), np.zeros((0, 3)))
-
-    @classmethod
-    def from_pose(cls, pose: np.ndarray) -> Self:
-        """The start that a person asks for, `(3,)`; it meets what test start 0 does."""
-        return cls(("pose",), pose[None])
-
-    def met(self, conditions: Conditions, steps: int) -> Disturbances | None:
-        """What trials from here meet: as in the held-out test of all starts."""
-        everything = held_out_disturbances(conditions, self.purpose, self.total, steps)
-        if everything is None:
-            return None
-        return everything[self.first : self.first + len(self.names)]
-
-
-def numbered_starts(spec: str, scene: Scene, clearance: float) -> Starts:
-    """Starts that a person names, such as `test:0-9` or `validation:3`.
-
-    Raises:
-        UserError: if it names none.
-    """
-    sizes = {"test": N_TEST, "validation": N_VALIDATION}
-    found = re.fullmatch(r"(\w+):(\d{1,9})(?:-(\d{1,9}))?", spec)
-    if not found or found[1] not in sizes:
-        raise UserError(
-            f"expected starts such as test:0, test:0-9 or validation:7, got '{spec}'"
-        )
-    name, first, last = found[1], int(found[2]), int(found[3] or found[2])
-    if not first <= last < sizes[name]:
-        raise UserError(
-            f"expected {name} starts from 0 to {sizes[name] - 1}, the lower number "
-            f"first, got '{spec}'"
-        )
-    space = FreeSpace(scene, clearance)
-    if name == "test":
-        purpose, poses = Purpose.TEST, starts_for_test(space, last + 1)
-    else:
-        purpose, poses = Purpose.VALIDATION, starts_for_validation(space)
-    names = tuple(f"{name} {i}" for i in range(first, last + 1))
-    return Starts(names, poses[first : last + 1], purpose, sizes[name], first)
 
 
 def simulated(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from evolution.judging.held_out import WHEELED_ROBOT
+from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.pages.words import robot_name
 from evolution.study.data import StudyData
 

@@ -1,10 +1,10 @@
 """The table of runs, runs.csv: what each run found."""
 
 import csv
+import math
 from typing import Any
 
 from evolution.report.measures import shown_robots
-from evolution.report.samples import clearance, following_share, whole_lap_share
 from evolution.run.directory import RunDirectory
 from evolution.study.data import RunData, StudyData
 
@@ -27,29 +27,34 @@ def run_rows(data: StudyData) -> list[dict[str, Any]]:
 def _run_row(data: StudyData, name: str, run: RunData) -> dict[str, Any]:
     row: dict[str, Any] = {"experiment": name, "seed": run.seed}
     for robot in shown_robots(data):
-        test = run.champion.scores["held_out"][robot]
-        low, high = test.get("interval") or (None, None)
+        test = run.scores.held_out[robot]
+        low, high = test.interval
         columns = {
-            "mean": test["mean"],
-            "standard_deviation": test.get("standard_deviation"),
+            "mean": test.mean,
+            "standard_deviation": test.standard_deviation,
             "mean_low": low,
             "mean_high": high,
-            "worst": test.get("worst"),
-            "crash_rate": test.get("crash_rate"),
-            "collisions_per_minute": test.get("collisions_per_minute"),
-            "following": following_share(test) if test.get("behaviour") else None,
-            "clearance_mean": clearance(test),
-            "whole_lap": whole_lap_share(test),
-            "starts": test.get("starts"),
+            "worst": test.worst,
+            "crash_rate": test.crash_rate,
+            "collisions_per_minute": test.collisions_per_minute,
+            "following": test.following,
+            "clearance_mean": test.clearance,
+            "whole_lap": test.whole_laps,
+            "starts": test.starts,
         }
         row |= {f"{robot} {column}": value for column, value in columns.items()}
-    return row | {
-        "stored": run.stored,
-        "validation": run.champion.scores.get("validation"),
+    row |= {
+        "stored": run.scores.stored,
+        "validation": run.scores.validation,
         "best_stored": float(run.history["best"].max()),
         "evaluations": int(run.history["evaluations"][-1]),
         "control_steps": control_steps(run),
         "path": run.path.as_posix(),
+    }
+    # nan is what the champion's file does not say
+    return {
+        column: None if isinstance(value, float) and math.isnan(value) else value
+        for column, value in row.items()
     }
 
 

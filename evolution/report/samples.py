@@ -1,10 +1,11 @@
 """Samples of a report: what an experiment's champions show, one value per run."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from evolution.judging.scores import HeldOut
 from evolution.statistics.targets import evaluations_to_target
 from evolution.study.data import RunData, StudyData
 
@@ -17,69 +18,40 @@ TARGET_SHARES: tuple[float, ...] = tuple(
 """Targets as shares of the highest fitness there is: 50, 75, ... 225 of 300."""
 
 
-def tests_of(data: StudyData, name: str, robot: str) -> list[Mapping[str, Any]]:
+def tests_of(data: StudyData, name: str, robot: str) -> list[HeldOut]:
     """The held-out evaluations of an experiment's champions on a robot."""
-    return [run.champion.scores["held_out"][robot] for run in data.runs[name]]
+    return [run.scores.held_out[robot] for run in data.runs[name]]
 
 
-def known(tests: Sequence[Mapping[str, Any]], key: str) -> np.ndarray:
-    """A value of each held-out evaluation that has it, `(n,)`."""
-    values = [test.get(key) for test in tests]
-    return np.array([value for value in values if value is not None], float)
+def crash_rates(tests: Sequence[HeldOut]) -> np.ndarray:
+    """Share of the trials that crashed, of each held-out evaluation, `(n,)`."""
+    return np.array([test.crash_rate for test in tests])
 
 
-def following_share(test: Mapping[str, Any]) -> float:
-    """Share of a champion's trials that followed walls, hugging them or not."""
-    shares = test["behaviour"]
-    return shares.get("wall follower", 0.0) + shares.get("hugger", 0.0)
-
-
-def clearance(test: Mapping[str, Any]) -> float | None:
-    """Mean clearance of a held-out evaluation [m], None if it does not say."""
-    return _metric(test, "clearance_mean")
-
-
-def whole_lap_share(test: Mapping[str, Any]) -> float | None:
-    """Share of its trials with a whole lap, likewise."""
-    return _metric(test, "success")
-
-
-def _metric(test: Mapping[str, Any], name: str) -> float | None:
-    return (test.get("metrics") or {}).get(name)
+def known(values: Sequence[float]) -> np.ndarray:
+    """Those of the values that are not nan, `(n,)`."""
+    return np.array([value for value in values if not math.isnan(value)])
 
 
 def clearances(data: StudyData, name: str, robot: str) -> np.ndarray:
     """Mean clearance of each champion that was near a wall [m], `(n,)`."""
-    return _metrics(data, name, robot, clearance)
+    return known([test.clearance for test in tests_of(data, name, robot)])
 
 
 def whole_laps(data: StudyData, name: str, robot: str) -> np.ndarray:
     """Share of each champion's trials with a whole lap, `(n,)`."""
-    return _metrics(data, name, robot, whole_lap_share)
-
-
-def _metrics(
-    data: StudyData,
-    name: str,
-    robot: str,
-    metric: Callable[[Mapping[str, Any]], float | None],
-) -> np.ndarray:
-    values = [metric(test) for test in tests_of(data, name, robot)]
-    return np.array([value for value in values if value is not None], float)
+    return known([test.whole_laps for test in tests_of(data, name, robot)])
 
 
 def class_means(data: StudyData, name: str, robot: str) -> dict[str, float]:
     """Mean share of each behaviour class over the runs that say; may be empty."""
-    each = [test["behaviour"] for test in tests_of(data, name, robot) if _says(test)]
+    tests = tests_of(data, name, robot)
+    each = [test.behaviour for test in tests if test.behaviour]
     classes = dict.fromkeys(name for shares in each for name in shares)
     return {
         name: float(np.mean([shares.get(name, 0.0) for shares in each]))
         for name in classes
     }
-
-
-def _says(test: Mapping[str, Any]) -> bool:
-    return bool(test.get("behaviour"))
 
 
 def kept(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
@@ -109,8 +81,8 @@ def most_believed(data: StudyData, name: str) -> tuple[np.ndarray, np.ndarray]:
     """
     if disturbed(data, name):
         return np.empty(0), np.empty(0)
-    found = [run.champion.scores.get("most_believed") for run in data.runs[name]]
-    pairs = [(each["stored"], each["held_out"]) for each in found if each]
+    found = [run.scores.most_believed for run in data.runs[name]]
+    pairs = [(each.stored, each.held_out) for each in found if each]
     stored, held_out = np.array(pairs, float).reshape(-1, 2).T
     return stored, held_out
 

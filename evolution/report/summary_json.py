@@ -15,9 +15,9 @@ from evolution.report.run_table import run_rows
 from evolution.report.samples import (
     class_means,
     clearances,
+    crash_rates,
     disturbed,
     kept,
-    known,
     most_believed,
     tests_of,
 )
@@ -47,7 +47,9 @@ def summary_fields(data: StudyData, output: str, ioh: bool) -> dict[str, Any]:
             "experiments": {name: _experiment(data, name) for name in data.configs},
             "config_differences": differences(data.configs, ("seed",)),
             "configs": {name: _keys(config) for name, config in data.configs.items()},
-            "yardstick": data.yardstick,
+            "yardstick": {
+                robot: test.to_dict() for robot, test in data.yardstick.items()
+            },
             "runs": run_rows(data),
             "pairwise": pair_rows(data),
             "success": success_rows(data),
@@ -78,9 +80,7 @@ def _experiment(data: StudyData, name: str) -> dict[str, Any]:
         "held_out": {
             robot: {
                 "fitness": _described(data.held_out(name, robot)),
-                "crash_rate": _described(
-                    known(tests_of(data, name, robot), "crash_rate")
-                ),
+                "crash_rate": _described(crash_rates(tests_of(data, name, robot))),
                 # of experiments with noise, stored fitness is another quantity
                 "share_of_stored": None
                 if disturbed(data, name)

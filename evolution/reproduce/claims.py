@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evolution.judging.held_out import WHEELED_ROBOT
+from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.pages.words import PAPERS, label, median_and_quartiles
 from evolution.report.measures import held_out_measure, measures
-from evolution.report.samples import FOLLOWING, following_share
+from evolution.report.samples import FOLLOWING, known
 from evolution.report.sections.comparisons import (
     Comparison,
     comparisons_of,
@@ -218,11 +218,9 @@ def _follows(study: StudyData, name: str) -> Claim:
         f"(read as: {FOLLOWING:.0%} of its trials on {WHEELED_ROBOT} are a wall "
         "follower's or a hugger's)"
     )
-    tests = [run.champion.scores["held_out"] for run in study.runs.get(name, ())]
-    tests = [test[WHEELED_ROBOT] for test in tests]
-    sample = np.array(
-        [100 * following_share(test) for test in tests if test.get("behaviour")]
-    )
+    runs = study.runs.get(name, ())
+    tests = [run.scores.held_out[WHEELED_ROBOT] for run in runs]
+    sample = 100 * known([test.following for test in tests])
     return _claim(
         text, sample, lambda: of_most(sample >= 100 * FOLLOWING), "share of trials"
     )

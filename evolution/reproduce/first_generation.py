@@ -43,7 +43,7 @@ def first_generation(config: ExperimentConfig, fitness: str) -> FirstGeneration:
     config = config.model_copy(update={"fitness": fitness})
     experiment = Experiment(config)
     record = next(experiment.run())
-    judge = Judge(experiment.scene, config.task, config.start_clearance)
+    judge = Judge(experiment.scene, experiment.space, config.task)
     best = config.network.decode(experiment.best_genomes[0])
     test = judge.test(best, FRESH_STARTS)
     return FirstGeneration(

@@ -124,7 +124,7 @@ def runs_table(study: StudyData) -> Table:
         if runs
     ]
     if study.yardstick:
-        means = [f"{study.yardstick[robot]['mean']:.1f}" for robot in robots]
+        means = [f"{study.yardstick[robot].mean:.1f}" for robot in robots]
         rows.append([f"{YARDSTICK}, written by hand", "", "", *means, ""])
     return Table([*columns, "best stored"], rows)
 

@@ -8,21 +8,20 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import tyro
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import check_threads, command, main, parse
 from epuck_mj.host.interruption import Interrupted, Interruption
-from epuck_mj.policies.file import ControllerFile
+from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
-from evolution.run.execution import Means, Run
-from evolution.run.live import Live, require_viewer
-from evolution.run.progress import Progress
-from evolution.run.results import summary
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import DEFAULT_EXPERIMENT, find_config, load_config
+
+if TYPE_CHECKING:
+    from evolution.run.execution import Run
 
 MODULE = "evolution.run"
 
@@ -71,6 +70,8 @@ def run(argv: Sequence[str]) -> int:
         return 0
     check_threads(options.threads)
     if options.live:
+        from evolution.run.live import require_viewer
+
         require_viewer()
     if options.resume is not None:
         directory = RunDirectory(options.resume)
@@ -83,6 +84,10 @@ def run(argv: Sequence[str]) -> int:
         default = Path("runs") / f"{stem}-seed-{options.config.seed}"
         directory = RunDirectory(options.output or default)
         directory.refuse_if_used()
+    # simulators are for those who simulate
+    from evolution.run.execution import Run
+    from evolution.run.means import Means
+
     means = Means(options.engine, options.threads, options.racing)
     evolution = Run(options.config, directory, means, argv)
     with directory.locked():
@@ -123,14 +128,14 @@ def _options(argv: Sequence[str]) -> Options:
     return options
 
 
-def _carry_out(evolution: Run, live: bool) -> int:
+def _carry_out(evolution: "Run", live: bool) -> int:
     """Evolve, then choose and show the champion; the exit status."""
     experiment, directory = evolution.experiment, evolution.directory
     started = time.monotonic()
     with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:
         try:
             with interruption.raising():
-                controller = _finished(evolution, live)
+                scores = _finished(evolution, live)
         except Interrupted:
             print(
                 f"Interrupted after {directory.evaluations():,} evaluations; go on "
@@ -144,14 +149,17 @@ def _carry_out(evolution: Run, live: bool) -> int:
         f"{experiment.evaluations:,} evaluations in {len(experiment.records)} "
         f"generations, {minutes} min {seconds} s"
     )
-    print(summary(controller))
+    print(scores.in_lines(experiment.config.steps))
     print(f"Written to {directory.path}: {directory.contents()}")
     print(_replay(directory))
     return 0
 
 
-def _finished(evolution: Run, live: bool) -> ControllerFile:
-    """Evolve, and choose the champion."""
+def _finished(evolution: "Run", live: bool) -> Scores:
+    """Scores of the champion, once evolved and chosen."""
+    from evolution.run.live import Live
+    from evolution.run.progress import Progress
+
     experiment = evolution.experiment
     budget = experiment.config.evaluations
     with (

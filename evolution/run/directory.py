@@ -4,6 +4,7 @@ import csv
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from filelock import FileLock, Timeout
@@ -11,10 +12,12 @@ from filelock import FileLock, Timeout
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.yaml_and_json import read_json
-from evolution.run.generation_loop import Experiment
 from evolution.run.provenance import now, to_json
 from evolution.settings.config import ExperimentConfig, differing_keys
 from evolution.settings.config_files import load_config
+
+if TYPE_CHECKING:
+    from evolution.run.generation_loop import Experiment
 
 LOCK = ".lock"
 """File that the process which works in a directory holds."""
@@ -128,7 +131,7 @@ class RunDirectory:
                 + ", ".join(differing)
             )
 
-    def restore(self, experiment: Experiment, provenance: dict) -> list[str]:
+    def restore(self, experiment: "Experiment", provenance: dict) -> list[str]:
         """Put the experiment where the checkpoint is; at its start if there is none.
 
         Returns:
@@ -169,7 +172,7 @@ class RunDirectory:
                 f"since (SHA-256 {before}, now {after})"
             )
 
-    def save(self, experiment: Experiment, seconds: Sequence[float]) -> None:
+    def save(self, experiment: "Experiment", seconds: Sequence[float]) -> None:
         """Checkpoint, then what can be derived from it.
 
         Args:
@@ -191,7 +194,9 @@ class RunDirectory:
                 f"is intact: --resume {self.path}"
             ) from None
 
-    def _write_derived(self, experiment: Experiment, seconds: Sequence[float]) -> None:
+    def _write_derived(
+        self, experiment: "Experiment", seconds: Sequence[float]
+    ) -> None:
         """What the checkpoint holds as well, for those who only read."""
         files.write_text(self.history, experiment.history())
         if experiment.records:
@@ -202,7 +207,7 @@ class RunDirectory:
             files.write_arrays(self.best_individuals, best)
             files.write_text(self.timing, self._timing(experiment, seconds))
 
-    def _timing(self, experiment: Experiment, seconds: Sequence[float]) -> str:
+    def _timing(self, experiment: "Experiment", seconds: Sequence[float]) -> str:
         """Text of timing.csv; no seconds where a kill took them."""
         taken: dict[int, str] = {}
         if files.is_file(self.timing):

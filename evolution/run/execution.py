@@ -6,35 +6,19 @@ out, and however often it is interrupted, the same config leaves the same bytes.
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from epuck_mj.host.files import writing
-from epuck_mj.policies.file import ControllerFile
-from evolution.judging.evaluation import Engine
+from evolution.judging.held_out import Judges
+from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
 from evolution.run.generation_loop import Experiment, Record
+from evolution.run.means import Means
 from evolution.run.provenance import provenance
-from evolution.run.results import judges, write_results
+from evolution.run.results import write_results
 from evolution.settings.config import ExperimentConfig
 
 SAVING_SHARE = 0.05
 """Most of the time that goes into checkpoints, where generations are short."""
-
-
-@dataclass(frozen=True)
-class Means:
-    """How a run is carried out, which changes none of its results.
-
-    Attributes:
-        engine: one of `generation_loop.ENGINES`, or an engine whose `str` is what
-            the provenance calls it.
-        threads: that step the robots; 0 is one per core.
-        racing: break off individuals that can only lose.
-    """
-
-    engine: str | Engine = "batch"
-    threads: int = 0
-    racing: bool = True
 
 
 class Run:
@@ -61,7 +45,10 @@ class Run:
         self.experiment = Experiment(config, means.engine, means.threads, means.racing)
         self.directory = directory
         # found out now, not after the evolution
-        self._judges = judges(config, means.threads)
+        judges = Judges(means.threads)
+        scene, space = self.experiment.scene, self.experiment.space
+        judges.add(config.robot, config.setting, scene, space)
+        self._judges = judges.tested_on(config.robot, config.setting)
         self._provenance = provenance(
             self.experiment.scene, argv, str(means.engine), means.threads
         )
@@ -100,15 +87,15 @@ class Run:
                 cost, seconds = before - after, []
             yield record
 
-    def finish(self) -> ControllerFile:
-        """Choose the champion, test it, and write all that shows it.
+    def finish(self) -> Scores:
+        """Scores of the champion: it is chosen, tested, and all written that shows it.
 
         Raises:
             UserError: if it cannot be written.
         """
         with writing():
-            controller = write_results(
+            scores = write_results(
                 self.experiment, self._judges, self.directory, self._threads
             )
         self.directory.mark_finished()
-        return controller
+        return scores

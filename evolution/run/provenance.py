@@ -8,15 +8,16 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from epuck_mj.scene.model import Scene
+if TYPE_CHECKING:
+    from epuck_mj.scene.model import Scene
 
 PACKAGES = ("mujoco", "dm-control", "numpy", "scipy", "pydantic", "rerun-sdk")
 
 
 def provenance(
-    scene: Scene, argv: Sequence[str], engine: str, threads: int
+    scene: "Scene", argv: Sequence[str], engine: str, threads: int
 ) -> dict[str, Any]:
     """Everything that could explain a difference, as JSON values.
 

@@ -1,44 +1,27 @@
 """What a finished run shows: its champion, judged by fresh starts, drawn and logged."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from epuck_mj.host import files
 from epuck_mj.policies.file import ControllerFile, Origin
+from epuck_mj.policies.network import Controller
 from epuck_mj.scene.model import Scene
-from epuck_mj.show.figures import fitness_figure, trajectory_figure
-from epuck_mj.show.pictures import save_figure
-from epuck_mj.show.recording import Trial, save_recording
+from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.trials.recorder import record_trajectories
 from evolution.judging.evaluation import BatchEngine
-from evolution.judging.held_out import WHEELED_ROBOT, HeldOut, Judge, judging, tested_on
+from evolution.judging.held_out import Judge
+from evolution.judging.scores import Believed, Scores
 from evolution.judging.starts import N_TEST, held_out_disturbances
 from evolution.run.champion import Champion, choose_champion, most_believed
 from evolution.run.directory import RunDirectory
 from evolution.run.generation_loop import Experiment
-from evolution.settings.config import ExperimentConfig
 from evolution.settings.randomness import Purpose
 
 N_SHOWN = 4
 """Trials of the champion in the picture; the first is also the recording."""
-
-
-def judges(config: ExperimentConfig, threads: int = 0) -> dict[str, Judge]:
-    """The robots that a champion is tested on: its own, then the planar or wheeled one.
-
-    Raises:
-        UserError: if the wheeled robot cannot use the arena, or nobody can measure it.
-    """
-    judge = judging(threads)
-    return {
-        Path(robot).name: judge(robot, config.setting)
-        for robot in tested_on(config.robot)
-    }
 
 
 def write_results(
@@ -46,24 +29,23 @@ def write_results(
     judges: Mapping[str, Judge],
     directory: RunDirectory,
     threads: int = 0,
-) -> ControllerFile:
+) -> Scores:
     """Choose the champion, test it, and write everything that shows it.
 
     Args:
         experiment: a finished run.
-        judges: robots to test it on, as of `judges`.
+        judges: by robot, as of `Judges.tested_on`.
         directory: where to write.
         threads: that step the robots; 0 is one per core.
 
     Returns:
-        The champion as written, with its scores.
+        The champion's scores, as written.
     """
     config = experiment.config
     champion = choose_champion(
         BatchEngine(experiment.scene, config.task, threads), experiment
     )
     policy = config.network.decode(champion.genome)
-    tests = {robot: judge.test(policy) for robot, judge in judges.items()}
     met = held_out_disturbances(config.conditions, Purpose.TEST, N_TEST, config.steps)
     as_evolved = {
         robot: judge.test(policy, N_TEST, met)
@@ -73,62 +55,29 @@ def write_results(
     # what the run believed its best to be, and what that is worth on an ideal robot
     genome, stored = most_believed(experiment)
     believed = next(iter(judges.values())).test(config.network.decode(genome))
-    most = {"stored": stored, "held_out": believed.mean}
-    controller = _controller_file(experiment, champion, tests, as_evolved, most)
+    scores = Scores(
+        stored=champion.stored_fitness,
+        validation=champion.validation_fitness,
+        held_out={robot: judge.test(policy) for robot, judge in judges.items()},
+        most_believed=Believed(stored=stored, held_out=believed.mean),
+    )
+    if as_evolved:
+        scores = scores.model_copy(update={"held_out_as_evolved": as_evolved})
+    controller = _controller_file(experiment, champion, scores)
     files.write_text(directory.champion, controller.to_json())
     _draw_fitness(experiment, directory)
     wheeled = judges[WHEELED_ROBOT]
     starts = wheeled.starts(N_SHOWN)
     shown = None if met is None else met[:N_SHOWN]
-    _show(experiment, directory, controller, wheeled.scene, starts, shown)
-    return controller
-
-
-def summary(controller: ControllerFile) -> str:
-    """Held-out fitness on each robot and stored fitness, in lines."""
-    scores, steps = controller.scores, controller.task.steps
-    starts = next(iter(scores["held_out"].values()))["starts"]
-    lines = [
-        f"Held-out fitness of {steps}, mean of {starts} fresh starts: "
-        + _held_out(scores["held_out"]),
-        f"Stored fitness of {steps}, what evolution believes: {scores['stored']:.1f}",
-    ]
-    if "held_out_as_evolved" in scores:
-        disturbed = _held_out(scores["held_out_as_evolved"])
-        lines.insert(1, f"The same with the disturbances it evolved with: {disturbed}")
-    return "\n".join(lines)
-
-
-def scores(controller: ControllerFile) -> str:
-    """The same in short."""
-    found = controller.scores
-    return f"held-out {_held_out(found['held_out'])}; stored {found['stored']:.1f}"
-
-
-def _held_out(tests: Mapping[str, Any]) -> str:
-    return ", ".join(
-        f"{robot} {test['mean']:.1f} ({test['crash_rate']:.0%} crash)"
-        for robot, test in tests.items()
-    )
+    text = scores.in_lines(config.steps)
+    _show(experiment, directory, policy, wheeled.scene, starts, shown, text)
+    return scores
 
 
 def _controller_file(
-    experiment: Experiment,
-    champion: Champion,
-    tests: dict[str, HeldOut],
-    as_evolved: dict[str, HeldOut],
-    most_believed: dict[str, float],
+    experiment: Experiment, champion: Champion, scores: Scores
 ) -> ControllerFile:
     config = experiment.config
-    scores: dict[str, Any] = {
-        "stored": champion.stored_fitness,
-        "validation": champion.validation_fitness,
-        "held_out": {robot: asdict(test) for robot, test in tests.items()},
-        "most_believed": most_believed,
-    }
-    if as_evolved:
-        disturbed = {robot: asdict(test) for robot, test in as_evolved.items()}
-        scores["held_out_as_evolved"] = disturbed
     return ControllerFile(
         network=config.network,
         genome=champion.genome,
@@ -139,11 +88,14 @@ def _controller_file(
             config.start_clearance,
             dict(experiment.scene.sha256),
         ),
-        scores=scores,
+        scores=scores.to_dict(),
     )
 
 
 def _draw_fitness(experiment: Experiment, directory: RunDirectory) -> None:
+    from epuck_mj.show.figures import fitness_figure
+    from epuck_mj.show.pictures import save_figure
+
     records = experiment.records
     figure = fitness_figure(
         [record.evaluations for record in records],
@@ -158,14 +110,19 @@ def _draw_fitness(experiment: Experiment, directory: RunDirectory) -> None:
 def _show(
     experiment: Experiment,
     directory: RunDirectory,
-    controller: ControllerFile,
+    policy: Controller,
     scene: Scene,
     starts: np.ndarray,
     met: Disturbances | None,
+    scores: str,
 ) -> None:
     """Trials of the champion on the wheeled robot, with the disturbances they met."""
+    from epuck_mj.show.figures import trajectory_figure
+    from epuck_mj.show.pictures import save_figure
+    from epuck_mj.show.recording import Trial, save_recording
+
     task = experiment.config.task
-    trials = record_trajectories(scene, controller.controller, starts, task, met)
+    trials = record_trajectories(scene, policy, starts, task, met)
     titles = [
         f"start {i}: fitness {trial.trial_fitness:.0f}"
         for i, trial in enumerate(trials)
@@ -176,7 +133,5 @@ def _show(
     trials[0].save(directory.trajectory)
     trial = Trial("start 0", trials[0], task)
     title = f"{experiment.optimizer.name}, seed {experiment.config.seed}"
-    text = (
-        f"# {title}\n\n{summary(controller)}\n\n```\n{experiment.config.to_yaml()}```\n"
-    )
+    text = f"# {title}\n\n{scores}\n\n```\n{experiment.config.to_yaml()}```\n"
     save_recording(directory.recording, scene, [trial], title, text)

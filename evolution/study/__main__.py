@@ -6,7 +6,7 @@ import signal
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
@@ -18,9 +18,9 @@ from epuck_mj.host.command_line import command, main, parse
 from epuck_mj.host.interruption import Interrupted, Interruption
 from epuck_mj.policies import file as controller_file
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
+from evolution.judging.scores import KnownScores, Scores
 from evolution.run.directory import RunDirectory, locked
-from evolution.run.execution import Means
-from evolution.run.results import judges, scores
+from evolution.run.means import Means
 from evolution.study.config import StudyConfig, find_study, parse_seeds
 from evolution.study.directory import PATIENCE, StudyDirectory
 from evolution.study.jobs import Event, Job, carry_out_side_by_side
@@ -124,15 +124,15 @@ def _measure_yardstick(directory: StudyDirectory) -> None:
     """Test the hand-written wall follower as champions are, unless it was before."""
     if directory.yardstick.exists():
         return
+    from evolution.judging.held_out import Judges
+
     # in the setting of the first experiment
     config = next(iter(directory.stored_config().experiments.values()))
-    tests = {
-        robot: asdict(judge.test(WallFollower()))
-        for robot, judge in judges(config).items()
-    }
+    judges = Judges().tested_on(config.robot, config.setting)
+    tests = {robot: judge.test(WallFollower()) for robot, judge in judges.items()}
     # whoever opens the study removes what looks left over
     with locked(directory.path, PATIENCE), files.writing():
-        text = json.dumps({"held_out": tests}, indent=1) + "\n"
+        text = json.dumps(KnownScores(held_out=tests).to_dict(), indent=1) + "\n"
         files.write_text(directory.yardstick, text)
 
 
@@ -200,9 +200,9 @@ def _shown(
 
 def _line(job: Job) -> str:
     """What a finished run has found."""
-    return f"{job}: " + scores(
-        controller_file.load(RunDirectory(job.directory).champion)
-    )
+    path = RunDirectory(job.directory).champion
+    scores = Scores.read(controller_file.load(path).scores, path)
+    return f"{job}: {scores.in_short}"
 
 
 if __name__ == "__main__":

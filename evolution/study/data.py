@@ -4,10 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, Field, FiniteFloat, StrictInt, ValidationError
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
@@ -15,6 +13,7 @@ from epuck_mj.host.yaml_and_json import read_json
 from epuck_mj.policies import file as controller_file
 from epuck_mj.policies.file import ControllerFile
 from epuck_mj.policies.wall_follower import YARDSTICK
+from evolution.judging.scores import HeldOut, KnownScores, Scores
 from evolution.run.directory import RunDirectory
 from evolution.run.generation_loop import HISTORY
 from evolution.settings.config import ExperimentConfig, differing_keys
@@ -29,28 +28,25 @@ class RunData:
     Attributes:
         seed: its seed.
         history: columns of history.csv by name, `(generations,)` each.
-        champion: the champion, its scores with it.
+        champion: the champion.
+        scores: what it is worth.
         path: its directory.
     """
 
     seed: int
     history: Mapping[str, np.ndarray]
     champion: ControllerFile
+    scores: Scores
     path: Path
-
-    @property
-    def stored(self) -> float:
-        """What evolution believes of the champion."""
-        return self.champion.scores["stored"]
 
     def held_out(self, robot: str) -> float:
         """The champion's mean on the test starts."""
-        return self.champion.scores["held_out"][robot]["mean"]
+        return self.scores.held_out[robot].mean
 
     def held_out_as_evolved(self, robot: str) -> float:
-        """The same with the disturbances it evolved with; nan if not tested so."""
-        tests = self.champion.scores.get("held_out_as_evolved", {})
-        return tests[robot]["mean"] if robot in tests else math.nan
+        """The champion's mean with disturbances as it evolved; nan if not tested so."""
+        test = self.scores.held_out_as_evolved.get(robot)
+        return math.nan if test is None else test.mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +59,8 @@ class StudyData:
         runs: of each experiment, by ascending seed; there may be none.
         robots: that every champion was tested on; the one it evolved on comes first.
         steps: control steps of a trial: the most that a fitness can be.
-        yardstick: scores of the hand-written wall follower by robot, as a champion's
-            `held_out`; empty if not known, or not for all of these experiments.
+        yardstick: tests of the hand-written wall follower by robot; empty if not
+            known, or not for all of these experiments.
         missing: what is not there and why, a line each.
     """
 
@@ -73,7 +69,7 @@ class StudyData:
     runs: Mapping[str, tuple[RunData, ...]]
     robots: tuple[str, ...]
     steps: int
-    yardstick: Mapping[str, Mapping]
+    yardstick: Mapping[str, HeldOut]
     missing: tuple[str, ...]
 
     @property
@@ -88,7 +84,8 @@ class StudyData:
 
     def yardstick_mean(self, robot: str) -> float | None:
         """Held-out fitness of the hand-written wall follower, None if not known."""
-        return self.yardstick.get(robot, {}).get("mean")
+        test = self.yardstick.get(robot)
+        return None if test is None else test.mean
 
     def held_out(self, name: str, robot: str) -> np.ndarray:
         """Held-out fitness of an experiment's champions, `(runs,)`."""
@@ -96,7 +93,7 @@ class StudyData:
 
     def stored(self, name: str) -> np.ndarray:
         """Stored fitness of an experiment's champions, `(runs,)`."""
-        return np.array([run.stored for run in self.runs[name]])
+        return np.array([run.scores.stored for run in self.runs[name]])
 
     def best_stored(self, name: str) -> np.ndarray:
         """Highest stored fitness that each run has seen, `(runs,)`: the paper's."""
@@ -134,7 +131,7 @@ def load_study(path: Path) -> StudyData:
         said = "; ".join([*missing[:3], "..."] if len(missing) > 3 else missing)
         raise UserError(f"no finished run in '{path}': {said}")
     missing += _unpaired({n: each for n, each in runs.items() if n not in asked})
-    robots = {tuple(run.champion.scores["held_out"]) for run in everything}
+    robots = {tuple(run.scores.held_out) for run in everything}
     steps = {run.champion.task.steps for run in everything}
     if len(robots) > 1 or len(steps) > 1:
         raise UserError(
@@ -142,7 +139,7 @@ def load_study(path: Path) -> StudyData:
             f"robots {sorted(robots)} and steps {sorted(steps)}"
         )
     tested = robots.pop()
-    yardstick: Mapping[str, Mapping] = {}
+    yardstick: Mapping[str, HeldOut] = {}
     configs = config.experiments
     first, *others = configs
     differing = [n for n in others if configs[n].setting != configs[first].setting]
@@ -186,50 +183,9 @@ def _run(directory: RunDirectory, config: ExperimentConfig, seed: int) -> RunDat
     if differing:
         raise UserError(f"of another config: {', '.join(differing)}")
     champion = controller_file.load(directory.champion)
-    check_scores(champion.scores, directory.champion)
-    return RunData(seed, read_history(directory.history), champion, directory.path)
-
-
-class _Test(BaseModel):
-    """What reports read of a held-out evaluation."""
-
-    mean: FiniteFloat
-    standard_deviation: FiniteFloat | None = None
-    interval: tuple[float, float] | None = None
-    worst: FiniteFloat | None = None
-    crash_rate: FiniteFloat
-    starts: StrictInt = Field(gt=0)
-    behaviour: dict[str, FiniteFloat] | None = None
-    metrics: dict[str, FiniteFloat | None] | None = None
-
-
-class _Believed(BaseModel):
-    stored: FiniteFloat
-    held_out: FiniteFloat
-
-
-class _Yardstick(BaseModel):
-    held_out: dict[str, _Test] = Field(min_length=1)
-
-
-class _Scores(_Yardstick):
-    stored: FiniteFloat
-    held_out_as_evolved: dict[str, _Test] = {}
-    most_believed: _Believed | None = None
-
-
-def check_scores(scores: Any, path: Path, kind: type[BaseModel] = _Scores) -> None:
-    """Nothing, if the scores in the file at `path` are all there and numbers.
-
-    Raises:
-        UserError: naming what is not.
-    """
-    try:
-        kind.model_validate(scores)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"])) or "scores"
-        raise UserError(f"'{path}' is damaged: {where}: {first['msg']}") from None
+    scores = Scores.read(champion.scores, directory.champion)
+    history = read_history(directory.history)
+    return RunData(seed, history, champion, scores, directory.path)
 
 
 def read_history(path: Path) -> dict[str, np.ndarray]:
@@ -264,8 +220,10 @@ def _unpaired(runs: Mapping[str, tuple[RunData, ...]]) -> list[str]:
     ]
 
 
-def _yardstick(directory: StudyDirectory, robots: Sequence[str]) -> dict[str, dict]:
-    """Scores of the hand-written wall follower; empty if it was never tested.
+def _yardstick(
+    directory: StudyDirectory, robots: Sequence[str]
+) -> Mapping[str, HeldOut]:
+    """Tests of the hand-written wall follower; empty if it was never tested.
 
     Raises:
         UserError: if they are damaged.
@@ -273,9 +231,8 @@ def _yardstick(directory: StudyDirectory, robots: Sequence[str]) -> dict[str, di
     path = directory.yardstick
     if not path.is_file():
         return {}
-    fields = read_json(path)
-    check_scores(fields, path, _Yardstick)
-    missing = [robot for robot in robots if robot not in fields["held_out"]]
+    tests = KnownScores.read(read_json(path), path).held_out
+    missing = [robot for robot in robots if robot not in tests]
     if missing:
         raise UserError(f"'{path}' has no test on {missing[0]}")
-    return fields["held_out"]
+    return tests

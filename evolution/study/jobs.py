@@ -1,7 +1,8 @@
 """Jobs: the runs of a study, carried out side by side in processes of this machine.
 
-One process per run: whatever becomes of one, memory exhausted and `kill -9` included,
-the others go on. A process ends with the one that started it.
+A process does one run after the other, so that MuJoCo and scipy are loaded once.
+Whatever becomes of one, memory exhausted and `kill -9` included, its run fails and the
+others go on. A process ends with the one that started it.
 """
 
 import multiprocessing
@@ -13,13 +14,12 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import deaf_to_interrupts
 from evolution.run.directory import RunDirectory
-from evolution.run.execution import Means, Run
+from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 
 PATIENCE = 10.0
@@ -86,6 +86,9 @@ def generations(job: Job, means: Means) -> Generator[int]:
     Raises:
         UserError: for anything the user can put right.
     """
+    # MuJoCo is for those who simulate: the study itself does not
+    from evolution.run.execution import Run
+
     directory = RunDirectory(job.directory)
     with directory.locked(PATIENCE):
         if directory.config.exists():
@@ -108,61 +111,78 @@ def carry_out_side_by_side(
 ) -> Iterator[Event]:
     """Do all jobs, at most so many at once; the processes end with this generator."""
     waiting = list(reversed(jobs))
-    running: dict[Connection, tuple[Job, BaseProcess]] = {}
+    idle: list[_Worker] = []
+    busy: dict[Connection, tuple[Job, _Worker]] = {}
     try:
-        while waiting or running:
-            while waiting and len(running) < n_processes:
-                job = waiting.pop()
-                process, news = _started(job, means)
-                running[news] = job, process
-            for news in wait(list(running)):
-                assert isinstance(news, Connection)
-                job, process = running[news]
+        while waiting or busy:
+            while waiting and len(busy) < n_processes:
+                job, worker = waiting.pop(), idle.pop() if idle else _Worker(means)
+                busy[worker.line] = job, worker
+                # one that died meanwhile is noticed below
+                with suppress(OSError):
+                    worker.line.send(job)
+            for line in wait(list(busy)):
+                assert isinstance(line, Connection)
+                job, worker = busy[line]
                 try:
-                    evaluations, failure = news.recv()
-                    event = Event(job, evaluations, failure is not None, failure)
-                except EOFError:
-                    process.join()
-                    event = Event(job, ended=True, failure=_ending(process))
-                yield event
+                    event: Event = line.recv()
+                except (EOFError, ConnectionResetError):
+                    event = Event(job, ended=True, failure=worker.ending())
+                else:
+                    if event.ended:
+                        idle.append(worker)
                 if event.ended:
-                    del running[news]
-                    process.join()
-                    news.close()
+                    del busy[line]
+                yield event
     finally:
-        for _, process in running.values():
-            process.terminate()
-        for _, process in running.values():
-            process.join()
+        workers = [*idle, *(worker for _, worker in busy.values())]
+        for worker in workers:
+            worker.process.terminate()
+        for worker in workers:
+            worker.ending()
 
 
-def _started(job: Job, means: Means) -> tuple[BaseProcess, Connection]:
-    """A process that does the job, and the end of a pipe on which it reports."""
-    # a fresh interpreter: threads and MuJoCo do not survive a fork
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(
-        target=_work, args=(job, means, theirs), name=str(job), daemon=True
-    )
-    with deaf_to_interrupts():
-        process.start()
-    theirs.close()
-    return process, ours
+class _Worker:
+    """A process that does jobs, and the line on which it gets and reports them."""
+
+    def __init__(self, means: Means):
+        """Start it; it ignores Ctrl-C, which is for its parent to act on."""
+        # a fresh interpreter: threads and MuJoCo do not survive a fork
+        context = multiprocessing.get_context("spawn")
+        self.line, theirs = context.Pipe()
+        self.process = context.Process(target=_work, args=(means, theirs), daemon=True)
+        with deaf_to_interrupts():
+            self.process.start()
+        theirs.close()
+
+    def ending(self) -> str:
+        """Wait for its end, and say why it came."""
+        self.process.join()
+        self.line.close()
+        status = self.process.exitcode or 0
+        if status < 0:
+            return f"its process was killed by {signal.Signals(-status).name}"
+        return f"its process ended with status {status}"
 
 
-def _work(job: Job, means: Means, news: Connection) -> None:
-    """What the process does: report evaluations, and a failure if there is one."""
+def _work(means: Means, line: Connection) -> None:
+    """What a worker does: jobs as they come, until nobody is there to send any."""
     threading.Thread(target=_die_with_parent, daemon=True).start()
     try:
-        carry_out(job, means, lambda evaluations: news.send((evaluations, None)))
-        failure_log(job.directory).unlink(missing_ok=True)
-    except BrokenPipeError:
-        # the parent has gone
+        while True:
+            job: Job = line.recv()
+            failure = None
+            try:
+                carry_out(job, means, lambda done, job=job: line.send(Event(job, done)))
+                failure_log(job.directory).unlink(missing_ok=True)
+            except (BrokenPipeError, ConnectionResetError):
+                raise
+            except Exception as error:
+                failure = failure_of(job, error)
+            line.send(Event(job, ended=True, failure=failure))
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        # the parent has gone: what is on disk can be resumed at any moment
         os._exit(1)
-    except Exception as error:
-        news.send((0, failure_of(job, error)))
-    finally:
-        news.close()
 
 
 def failure_of(job: Job, error: Exception) -> str:
@@ -187,11 +207,3 @@ def _die_with_parent() -> None:
     wait([parent.sentinel])
     # what is on disk can be resumed at any moment
     os._exit(1)
-
-
-def _ending(process: BaseProcess) -> str | None:
-    """Why a process that said nothing more has ended; None if all is well."""
-    status = process.exitcode or 0
-    if status < 0:
-        return f"its process was killed by {signal.Signals(-status).name}"
-    return f"its process ended with status {status}" if status else None

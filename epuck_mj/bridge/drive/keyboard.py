@@ -23,7 +23,7 @@ class Keyboard:
     """Keys of a terminal, or of none."""
 
     def __init__(self, handle: int | None) -> None:
-        """Of the terminal with that file descriptor; None is no terminal."""
+        """Keys of the terminal with this file descriptor; None is no terminal."""
         self._handle = handle
 
     @property

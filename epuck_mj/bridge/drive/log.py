@@ -66,5 +66,5 @@ def save_log(
 
 
 def _files(name: Path) -> tuple[Path, Path]:
-    """Of a log: the trajectory and the recording; names may have dots of their own."""
+    """Trajectory and recording of a log, whose name may have dots of its own."""
     return name.with_name(f"{name.name}.npz"), name.with_name(f"{name.name}.rrd")

@@ -6,24 +6,24 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from epuck_mj.bridge.drive.console import HEADING, drive_summary, live_line
 from epuck_mj.bridge.drive.keyboard import Keyboard, keyboard
 from epuck_mj.bridge.drive.log import save_log
-from epuck_mj.bridge.drive.report import HEADING, live_line, summary
 from epuck_mj.bridge.drive.robot import RealRobot
 from epuck_mj.bridge.drive.session import Session
-from epuck_mj.bridge.errors import BridgeError, StillMoving
-from epuck_mj.bridge.line.connection import Connection
+from epuck_mj.bridge.failures import (
+    DONE,
+    FAILED,
+    RUNAWAY,
+    BridgeError,
+    StillMoving,
+)
+from epuck_mj.bridge.line.interfaces import Connection
 from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import Interrupted, Interruption
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import Policy, TaskParameters
-
-DONE, FAILED, RUNAWAY = 0, 3, 4
-"""Exit statuses: as planned; broken off, standing still; perhaps still moving.
-
-Beside 2 for what a user can put right before it starts, and 128 + signal.
-"""
 
 QUIET_PERIOD = 1.0
 """Time between two lines where they are not read on a terminal [s]."""
@@ -157,7 +157,7 @@ def _save(
     """Write the log; what to say of it all, and what went wrong with the log."""
     if robot is None or session.start is None:
         return "", None
-    facts = summary(session, robot)
+    facts = drive_summary(session, robot)
     text = f"# A real robot\n\n```\n{facts}\n```\n"
     try:
         files = save_log(mission.log, session, mission.policy, mission.scene, text)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from epuck_mj.bridge.errors import BridgeError
+from epuck_mj.bridge.failures import BridgeError
 from epuck_mj.bridge.language.replies import Steps, wrapped
 from epuck_mj.constants import STEP_RATE_MAX_2
 from epuck_mj.step.calibration import Calibration
@@ -24,7 +24,7 @@ class Odometry:
     """
 
     def __init__(self, calibration: Calibration, start: np.ndarray) -> None:
-        """At rest.
+        """A robot at rest where it starts.
 
         Args:
             calibration: the robot's wheel radii and track.

@@ -10,13 +10,13 @@ import numpy as np
 
 from epuck_mj.bridge.drive.odometry import Odometry
 from epuck_mj.bridge.drive.schedule import Schedule
-from epuck_mj.bridge.errors import (
+from epuck_mj.bridge.failures import (
     BridgeError,
     LinkLost,
     RobotRestarted,
     StaleReading,
 )
-from epuck_mj.bridge.line.connection import Connection, Greeting
+from epuck_mj.bridge.line.interfaces import Connection, Greeting
 from epuck_mj.constants import READING_AGE_MAX
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.motors import STEP_ANGLE, step_rates
@@ -45,10 +45,10 @@ class Moment:
 class RealRobot:
     """A robot on a connection; leaving its `with` block stops it, whatever happened.
 
-    A control step is two questions. As it starts, its speeds, if they changed: that is
-    `checked_cycle` with D, and the answer shows that they arrived. As it ends, the
-    reading. So the policy decides on what is sensed at that moment, as in simulation,
-    and not on what was sensed a control step ago.
+    A control step is two questions. As it starts, its speeds, if they changed: the echo
+    in the answer shows that they arrived. As it ends, the reading. So the policy
+    decides on what is sensed at that moment, as in simulation, and not on what was
+    sensed a control step ago.
 
     Attributes:
         schedule: when control steps end.
@@ -71,7 +71,7 @@ class RealRobot:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Nothing is sent yet.
+        """Take a connection, on which nothing is sent yet.
 
         Args:
             connection: how to reach it.
@@ -102,7 +102,7 @@ class RealRobot:
         return self._connection.n_repairs
 
     def __enter__(self) -> Self:
-        """Itself; nothing is sent yet."""
+        """The robot itself; nothing is sent yet."""
         return self
 
     def __exit__(

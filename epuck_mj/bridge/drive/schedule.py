@@ -20,7 +20,7 @@ class Schedule:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Not begun.
+        """A schedule that has not begun.
 
         Args:
             period: from tick to tick [s].

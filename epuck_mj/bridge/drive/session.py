@@ -39,7 +39,7 @@ class Session:
     Attributes:
         task: what the robot is at.
         start: its first moment; None if nothing was read.
-        reading: the first reading; likewise.
+        reading: its first reading; None if there was none.
         steps: so far.
     """
 

@@ -3,9 +3,11 @@
 An e-puck's firmware, quirks included, in a body that lives in MuJoCo. Whoever opens its
 port finds nothing that a real one would not say.
 
-- `body`: the wheels and sensors, in a scene;
-- `scenarios`: what goes wrong, and when;
+- `firmware`, `wifi_firmware`: what the robot's programs make of bytes; the `builds`
+  there are;
+- `motors_and_sensors`: what these programs move and read; `mujoco_body`: a body of them
+  in a scene;
+- `scenarios`: what goes wrong, and when; `wire`: where bytes are late or lost;
 - `emulator`: body, firmware and wires; bytes and times are arguments;
-- `endpoints`: a pseudo-terminal or a TCP port around it, in real time;
-- `virtual`: the same in a time of its own, for tests.
+- `endpoints`: a pseudo-terminal or a TCP port around it, in real time.
 """

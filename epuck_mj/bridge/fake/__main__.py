@@ -10,15 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from epuck_mj.bridge.fake.emulator import WIFI, Emulator
-from epuck_mj.bridge.fake.endpoints import Endpoint, Pty, Tcp, serve
-from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import random_scenario, scenario
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse
 from epuck_mj.host.files import check_writable
 from epuck_mj.host.interruption import Interrupted, Interruption
-from epuck_mj.scene.model import load_scene
 
 MODULE = "epuck_mj.bridge.fake"
 RANDOM = "random"
@@ -68,7 +64,13 @@ def fake(argv: Sequence[str]) -> int:
         UserError: for anything the user can put right.
     """
     options = parse(Options, f"python -m {MODULE}", argv)
-    _check(options)
+    _refuse_bad_options(options)
+    # physics is not for those who only ask for help
+    from epuck_mj.bridge.fake.emulator import WIFI, Emulator
+    from epuck_mj.bridge.fake.endpoints import Pty, Tcp, serve
+    from epuck_mj.bridge.fake.mujoco_body import MujocoBody
+    from epuck_mj.scene.model import load_scene
+
     faults = (
         random_scenario(options.seed, RANDOM_END)
         if options.scenario == RANDOM
@@ -83,9 +85,11 @@ def fake(argv: Sequence[str]) -> int:
 
     body = MujocoBody(scene, np.array([x, y, math.radians(degrees)]), clock())
     robot = options.firmware if options.wifi is None else WIFI
+    tcp = options.tcp if options.wifi is None else options.wifi
     emulator = Emulator(body, robot, clock(), faults, options.latency, options.seed)
     with Interruption() as interruption, tempfile.TemporaryDirectory() as folder:
-        endpoint = _endpoint(options, Path(folder))
+        link = options.link or Path(folder, "e-puck")
+        endpoint = Pty(link) if tcp is None else Tcp(tcp)
         try:
             with interruption.raising():
                 if faults:
@@ -104,21 +108,14 @@ def fake(argv: Sequence[str]) -> int:
     return 0
 
 
-def _endpoint(options: Options, folder: Path) -> Endpoint:
-    if options.wifi is not None:
-        return Tcp(options.wifi)
-    if options.tcp is not None:
-        return Tcp(options.tcp)
-    return Pty(options.link or folder / "e-puck")
-
-
-def _check(options: Options) -> None:
-    if sum(x is not None for x in (options.link, options.tcp, options.wifi)) > 1:
+def _refuse_bad_options(options: Options) -> None:
+    ports = [x for x in (options.link, options.tcp, options.wifi) if x is not None]
+    if len(ports) > 1:
         raise UserError("expected one of --link, --tcp and --wifi")
     if options.journal is not None:
         check_writable(options.journal)
-    if options.link is None and options.tcp is None and options.wifi is None:
-        _check_terminals()
+    if not ports and sys.platform == "win32":
+        raise UserError("this system has no pseudo-terminals: use --tcp")
     if not 0 < options.speed <= 1000:
         raise UserError(f"expected --speed above 0, up to 1000, got {options.speed}")
     if not 0 <= options.latency <= 1:
@@ -127,11 +124,6 @@ def _check(options: Options) -> None:
         raise UserError(f"expected --seed of 0 or more, got {options.seed}")
     if not all(map(math.isfinite, options.pose)):
         raise UserError(f"expected --pose of finite numbers, got {options.pose}")
-
-
-def _check_terminals() -> None:
-    if sys.platform == "win32":
-        raise UserError("this system has no pseudo-terminals: use --tcp")
 
 
 if __name__ == "__main__":

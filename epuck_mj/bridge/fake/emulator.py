@@ -1,7 +1,6 @@
 """An e-puck at the other end of a line where things go wrong. Bytes and times only."""
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
@@ -9,33 +8,16 @@ from epuck_mj.bridge.fake.builds import BUILDS
 from epuck_mj.bridge.fake.firmware import Firmware
 from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import GARBAGE_MAX, LOSS, Fault
+from epuck_mj.bridge.fake.talker import Talker
 from epuck_mj.bridge.fake.wifi_firmware import WifiFirmware
 from epuck_mj.bridge.fake.wire import Wire
 from epuck_mj.constants import BYTE_TIME
 from epuck_mj.errors import UserError
 
-
-class Talker(Protocol):
-    """A firmware, of either kind."""
-
-    @property
-    def n_told(self) -> int:
-        """How often it has told its proximity counts since it started."""
-        ...
-
-    def feed(self, data: bytes, now: float) -> None:
-        """Let it hear something."""
-        ...
-
-    def output(self, now: float) -> bytes:
-        """What it has said since the last call."""
-        ...
-
-
 WIFI = "wifi"
 """The e-puck2 behind its radio."""
 
-ROBOTS = (*BUILDS, WIFI)
+EMULATED_ROBOTS = (*BUILDS, WIFI)
 """The robots that can be emulated."""
 
 
@@ -60,7 +42,7 @@ class Emulator:
 
         Args:
             body: of the robot.
-            robot: one of ROBOTS.
+            robot: one of EMULATED_ROBOTS.
             now: the time [s].
             faults: what goes wrong.
             latency: of each way [s], beside the UART's.
@@ -69,8 +51,9 @@ class Emulator:
         Raises:
             UserError: if there is no such robot.
         """
-        if robot not in ROBOTS:
-            raise UserError(f"no robot '{robot}'; available: {', '.join(ROBOTS)}")
+        if robot not in EMULATED_ROBOTS:
+            names = ", ".join(EMULATED_ROBOTS)
+            raise UserError(f"no robot '{robot}'; available: {names}")
         self.body = body
         self._robot = robot
         self._faults = tuple(faults)

@@ -21,7 +21,8 @@ LOCALHOST = "127.0.0.1"
 IDLE_TIME, BUSY_TIME = 0.004, 0.0005
 """How long it sleeps when nothing, or something, is under way [s]."""
 
-READ_MAX = 4096
+HEARD_MAX = 4096
+"""Most bytes heard at once."""
 
 
 class Endpoint(Protocol):
@@ -35,7 +36,7 @@ class Endpoint(Protocol):
 
     @property
     def name(self) -> str:
-        """By which a host opens it."""
+        """Name by which a host opens it."""
         ...
 
     def open(self) -> None:
@@ -113,7 +114,7 @@ class Pty:
     def receive(self) -> bytes:
         """See Endpoint."""
         with contextlib.suppress(BlockingIOError):
-            return os.read(self._master, READ_MAX)
+            return os.read(self._master, HEARD_MAX)
         return b""
 
     def send(self, data: bytes) -> None:
@@ -191,7 +192,7 @@ class Tcp:
                 self._host.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             return b""
         try:
-            data = self._host.recv(READ_MAX)
+            data = self._host.recv(HEARD_MAX)
         except BlockingIOError:
             return b""
         except OSError:

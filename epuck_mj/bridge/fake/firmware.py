@@ -8,8 +8,8 @@ It does what the real ones do, quirks included:
 - binary replies come once, after the packet's zero; a packet of D, L and P has none;
 - while it calibrates it serves nobody, and its receive ring overflows;
 - the banner comes at a reset only; a reset forgets everything;
-- speeds saturate in silence while E tells them as they came; see `body` for what the
-  motors make of them.
+- speeds saturate in silence while E tells them as they came; see `motors_and_sensors`
+  for what the motors make of them.
 
 It speaks C, D, E, K, L, N, O, P, Q, R, S, V, and Asercom `b`; to the other letters it
 is a robot that doesn't know them. It opens nothing and waits for nothing: bytes and
@@ -30,6 +30,7 @@ from collections.abc import Generator
 
 from epuck_mj.bridge.fake.builds import Build
 from epuck_mj.bridge.fake.motors_and_sensors import Body, Motors, ProximitySensors
+from epuck_mj.bridge.fake.talker import Talker
 from epuck_mj.bridge.language.replies import wrapped
 from epuck_mj.constants import BATTERY_LOW, N_LEDS, RECEIVE_RING
 
@@ -39,7 +40,7 @@ BINARY_OPERANDS = {"D": 4, "L": 2, "P": 4}
 """Operand bytes of the binary commands that have any."""
 
 
-class Firmware:
+class Firmware(Talker):
     """A robot's firmware, from its power switch on.
 
     Attributes:
@@ -54,9 +55,8 @@ class Firmware:
             build: which robot it is.
             now: the time [s].
         """
-        self._body = body
+        super().__init__(body)
         self._build = build
-        self._out = bytearray()
         self.reset(now)
 
     def reset(self, now: float) -> None:
@@ -83,45 +83,19 @@ class Firmware:
         self._program = self._run()
         next(self._program)
 
-    @property
-    def n_told(self) -> int:
-        """How often it has told its proximity counts since it started."""
-        return self._sensors.n_told
-
-    def feed(self, data: bytes, now: float) -> None:
-        """Let it hear something.
-
-        Args:
-            data: any number of bytes.
-            now: the time [s], never less than before.
-        """
-        self._advance(now)
-        for byte in data:
-            self._ring.append(byte)
-            if len(self._ring) == RECEIVE_RING:
-                self._ring.clear()
-            self._serve()
-
-    def output(self, now: float) -> bytes:
-        """What it has said since the last call.
-
-        To be called often: it also is what makes time go by, and sensors are read
-        when their time has come and somebody calls.
-
-        Args:
-            now: the time [s], never less than before.
-        """
-        self._advance(now)
-        out = bytes(self._out)
-        self._out.clear()
-        return out
-
     def _advance(self, now: float) -> None:
         self._now = now
         self._sensors.advance(now)
         if self._pending and not self._sensors.calibrating:
             self._out += self._pending
             self._pending = b""
+            self._serve()
+
+    def _hear(self, data: bytes) -> None:
+        for byte in data:
+            self._ring.append(byte)
+            if len(self._ring) == RECEIVE_RING:
+                self._ring.clear()
             self._serve()
 
     def _serve(self) -> None:
@@ -233,7 +207,7 @@ class Firmware:
                 self.leds[number] = {0: 0, 1: 1, 2: 1 - was}.get(value, was)
 
     def _two_operands(self, line: bytes) -> tuple[int, int]:
-        """Of a line as C's `sscanf` reads them into 16 bits."""
+        """Operands of a line, as C's `sscanf` reads them into 16 bits."""
         letter = chr(line[0]).upper()
         found = re.match(
             rb".,\s*([+-]?\d{1,9})(?:,\s*([+-]?\d{1,9}))?", line, re.DOTALL

@@ -113,7 +113,7 @@ class Motors:
     """Both motors and their counters."""
 
     def __init__(self, body: Body, timer: MotorTimer) -> None:
-        """Standing still, counters at zero.
+        """Motors that stand still, with counters at zero.
 
         Args:
             body: what they move.
@@ -149,7 +149,7 @@ class ProximitySensors:
     """
 
     def __init__(self, body: Body, period: float, now: float) -> None:
-        """Not calibrated.
+        """Sensors that are not calibrated.
 
         Args:
             body: what senses.

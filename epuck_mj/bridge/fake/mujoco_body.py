@@ -22,7 +22,7 @@ from epuck_mj.step.motors import STEP_ANGLE
 from epuck_mj.step.sensors import Reading, proximity
 
 LEAD = 0.0045
-"""By so much may later commands be late for their physics step [s]. Chosen.
+"""Time by which later commands may be late for their physics step [s]. Chosen.
 
 Readings, asked for some 4 ms before commands, then see samples of 16 ms all in the same
 physics step if that is one of 25 ms.
@@ -66,7 +66,7 @@ class Journal:
 
 
 class MujocoBody:
-    """A robot in its scene: see `bridge.body.Body`.
+    """A robot in its scene: see `motors_and_sensors.Body`.
 
     Attributes:
         journal: what it did.
@@ -75,7 +75,7 @@ class MujocoBody:
     """
 
     def __init__(self, scene: Scene, start: np.ndarray, now: float) -> None:
-        """At rest.
+        """A robot at rest.
 
         Args:
             scene: robot and arena.

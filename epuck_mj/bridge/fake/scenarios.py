@@ -62,7 +62,7 @@ class Fault:
         return self.start <= time < self.start + self.duration
 
     def __str__(self) -> str:
-        """As in a scenario."""
+        """The fault as a scenario names it."""
         return f"{self.kind}@{self.start:g}+{self.duration:g}"
 
 

@@ -21,6 +21,7 @@ from epuck_mj.bridge.fake.motors_and_sensors import (
     MotorTimer,
     ProximitySensors,
 )
+from epuck_mj.bridge.fake.talker import Talker
 from epuck_mj.constants import (
     MOTOR_TICK_RATE_2,
     PROXIMITY_PERIOD_2,
@@ -30,10 +31,10 @@ from epuck_mj.constants import (
 )
 
 TIMER = MotorTimer(STEP_RATE_MAX, MOTOR_TICK_RATE_2, saves_current=False)
-"""Its motors, behind a radio that accepts less than the main processor does."""
+"""Motors behind a radio that accepts less than the main processor does."""
 
 
-class WifiFirmware:
+class WifiFirmware(Talker):
     """An e-puck2's radio and main processor, from the power switch on."""
 
     def __init__(self, body: Body, now: float) -> None:
@@ -43,47 +44,13 @@ class WifiFirmware:
             body: what it moves and senses with.
             now: the time [s].
         """
-        self._body = body
+        super().__init__(body)
         self._motors = Motors(body, TIMER)
         self._sensors = ProximitySensors(body, PROXIMITY_PERIOD_2, now)
         self._buffer = b""
         self._queue: deque[bytes] = deque()
         self._streams: int | None = None
         self._n_packets = int(now / WIFI_PERIOD)
-        self._out = bytearray()
-
-    @property
-    def n_told(self) -> int:
-        """How often it has told its proximity counts since it started."""
-        return self._sensors.n_told
-
-    def feed(self, data: bytes, now: float) -> None:
-        """Let it hear something.
-
-        Args:
-            data: any number of bytes.
-            now: the time [s], never less than before.
-        """
-        self._advance(now)
-        self._buffer += data
-        while (start := self._buffer.find(0x80)) >= 0:
-            if len(self._buffer) < start + 21:
-                return
-            if len(self._queue) < WIFI_QUEUE:
-                self._queue.append(self._buffer[start : start + 21])
-            self._buffer = self._buffer[start + 21 :]
-        self._buffer = b""
-
-    def output(self, now: float) -> bytes:
-        """What it has said since the last call; it also is what makes time go by.
-
-        Args:
-            now: the time [s], never less than before.
-        """
-        self._advance(now)
-        out = bytes(self._out)
-        self._out.clear()
-        return out
 
     def _advance(self, now: float) -> None:
         self._sensors.advance(now)
@@ -94,6 +61,16 @@ class WifiFirmware:
                 self._obey(self._queue.popleft())
             if self._streams is not None:
                 self._out += self._packets(self._streams)
+
+    def _hear(self, data: bytes) -> None:
+        self._buffer += data
+        while (start := self._buffer.find(0x80)) >= 0:
+            if len(self._buffer) < start + 21:
+                return
+            if len(self._queue) < WIFI_QUEUE:
+                self._queue.append(self._buffer[start : start + 21])
+            self._buffer = self._buffer[start + 21 :]
+        self._buffer = b""
 
     def _obey(self, command: bytes) -> None:
         self._streams, settings, left, right = struct.unpack_from("<BBhh", command, 1)

@@ -12,18 +12,17 @@ sercom protocol".
 
 import re
 from collections.abc import Callable
-from typing import TypeVar
 
-from epuck_mj.bridge.errors import BridgeError
-from epuck_mj.bridge.language.parsing import GREETING, Line, LinesParser, Request
+from epuck_mj.bridge.failures import BridgeError
+from epuck_mj.bridge.language.parsing import GREETING, Line, LinesParser, Request, T
 from epuck_mj.bridge.language.replies import (
     Acknowledged,
     Ambient,
     Battery,
     Calibrated,
+    CommandedSpeeds,
     Proximity,
     Restarted,
-    Speeds,
     Steps,
     Version,
 )
@@ -35,16 +34,14 @@ from epuck_mj.constants import (
     STEP_RATE_MAX,
 )
 
-T = TypeVar("T")
-
 ALL_LEDS = N_LEDS
-"""In the place of an LED's number: all of the ring."""
+"""Number that stands for all LEDs of the ring."""
 
 LED_OFF, LED_ON, LED_TOGGLED = range(3)
 """What an LED can be told."""
 
 
-def version() -> Request[Version]:
+def version_query() -> Request[Version]:
     """V, and E to mark its end: some robots answer V in one line, some in two.
 
     `v,` comes from nothing else, so once it came everything older is over: this is the
@@ -63,7 +60,7 @@ def version() -> Request[Version]:
     )
 
 
-def battery() -> Request[Battery]:
+def battery_query() -> Request[Battery]:
     """b: the battery, of Asercom only; others do not understand, or toggle an LED."""
     line = Line(
         re.compile(rb"\Ab,(\d{1,5}(?: \(\d{1,3}%\))?)\r\Z"), b"b,", "'b,' and its state"
@@ -77,27 +74,27 @@ def battery() -> Request[Battery]:
     return Request("b (battery)", b"b\r", lambda: LinesParser((line,), reply))
 
 
-def proximity() -> Request[Proximity]:
+def proximity_query() -> Request[Proximity]:
     """N: the proximity counts, of the sensors as calibrated last."""
     return _query("n", "N (proximity)", N_PROXIMITY, lambda *v: Proximity(v))
 
 
-def ambient() -> Request[Ambient]:
+def ambient_query() -> Request[Ambient]:
     """O: the ambient light counts."""
     return _query("o", "O (ambient light)", N_PROXIMITY, lambda *v: Ambient(v))
 
 
-def steps() -> Request[Steps]:
+def steps_query() -> Request[Steps]:
     """Q: the step counters."""
     return _query("q", "Q (step counters)", 2, Steps)
 
 
-def speeds() -> Request[Speeds]:
+def speeds_query() -> Request[CommandedSpeeds]:
     """E: the speeds last commanded."""
-    return _query("e", "E (commanded speeds)", 2, Speeds)
+    return _query("e", "E (commanded speeds)", 2, CommandedSpeeds)
 
 
-def drive(left: int, right: int) -> Request[Acknowledged]:
+def drive_order(left: int, right: int) -> Request[Acknowledged]:
     """D: both motors' speeds from now on, even when the link is lost.
 
     To be sent when they change: an e-puck v1 loses up to half a step each time it
@@ -110,16 +107,16 @@ def drive(left: int, right: int) -> Request[Acknowledged]:
     Raises:
         BridgeError: beyond +-1000, where the robot would saturate in silence.
     """
-    check_speeds(left, right)
+    refuse_fast_speeds(left, right)
     return _order("d", "D (speeds)", f"D,{left:d},{right:d}")
 
 
-def stop() -> Request[Acknowledged]:
+def stop_order() -> Request[Acknowledged]:
     """S: the motors stop, the ring's LEDs go out."""
     return _order("s", "S (stop)", "S")
 
 
-def led(number: int, value: int) -> Request[Acknowledged]:
+def led_order(number: int, value: int) -> Request[Acknowledged]:
     """L: one LED of the ring, or all.
 
     Args:
@@ -137,7 +134,7 @@ def led(number: int, value: int) -> Request[Acknowledged]:
     return _order("l", "L (LED)", f"L,{number:d},{value:d}")
 
 
-def calibrate() -> Request[Calibrated]:
+def calibration_order() -> Request[Calibrated]:
     """K: the sensors' offsets are measured anew; nothing may be in their range.
 
     The robot serves nobody meanwhile, and its motors go on.
@@ -154,7 +151,7 @@ def calibrate() -> Request[Calibrated]:
     )
 
 
-def reset() -> Request[Restarted]:
+def reset_order() -> Request[Restarted]:
     """R: the robot starts anew, with its banner. An e-puck2 does not answer.
 
     A robot that calibrates itself as it starts takes that time, too. More text may
@@ -168,7 +165,7 @@ def reset() -> Request[Restarted]:
     )
 
 
-def check_speeds(left: int, right: int) -> None:
+def refuse_fast_speeds(left: int, right: int) -> None:
     """Refuse speeds that the robot would silently make smaller.
 
     Raises:

@@ -10,8 +10,9 @@ Source: GCtronic's wiki, "e-puck2 PC side development"; `socket_e-puck2.c`.
 
 import struct
 
-from epuck_mj.bridge.errors import BridgeError
-from epuck_mj.bridge.language.ascii import check_speeds
+from epuck_mj.bridge.failures import BridgeError
+from epuck_mj.bridge.language.ascii import refuse_fast_speeds
+from epuck_mj.bridge.language.binary import PAIR
 from epuck_mj.bridge.language.replies import Ambient, Proximity, Sensors, Steps
 from epuck_mj.constants import N_PROXIMITY
 
@@ -37,11 +38,10 @@ BODY_BYTES = {IMAGE: 160 * 120 * 2, SENSORS: 104, EMPTY: 0}
 AT_PROXIMITY, AT_AMBIENT, AT_STEPS, AT_SELECTOR = 37, 53, 79, 89
 """Where things are in a sensor packet, its kind not counted."""
 
-COUNTS = struct.Struct(f"<{N_PROXIMITY}H")
-PAIR = struct.Struct("<2h")
+UNSIGNED_COUNTS = struct.Struct(f"<{N_PROXIMITY}H")
 
 
-def command(left: int, right: int, calibrate: bool = False) -> bytes:
+def wifi_command(left: int, right: int, calibrate: bool = False) -> bytes:
     """A command: speeds, sensors to be streamed, LEDs and sound off.
 
     Args:
@@ -55,7 +55,7 @@ def command(left: int, right: int, calibrate: bool = False) -> bytes:
     Raises:
         BridgeError: beyond +-1000, where the robot would saturate in silence.
     """
-    check_speeds(left, right)
+    refuse_fast_speeds(left, right)
     head = bytes([COMMAND, STREAM_SENSORS, CALIBRATE if calibrate else 0])
     return (head + PAIR.pack(left, right)).ljust(COMMAND_BYTES, b"\0")
 
@@ -64,7 +64,7 @@ class PacketParser:
     """Cuts what comes from an e-puck2 into packets; good for one connection."""
 
     def __init__(self) -> None:
-        """Nothing came yet."""
+        """A parser to which nothing came yet."""
         self._buffer = b""
 
     def feed(self, data: bytes) -> list[Sensors]:
@@ -87,11 +87,11 @@ class PacketParser:
                 break
             body, self._buffer = self._buffer[1:end], self._buffer[end:]
             if kind == SENSORS:
-                found.append(sensors(body))
+                found.append(sensors_in(body))
         return found
 
 
-def sensors(body: bytes) -> Sensors:
+def sensors_in(body: bytes) -> Sensors:
     """What the bridge reads of a sensor packet.
 
     Args:
@@ -101,8 +101,8 @@ def sensors(body: bytes) -> Sensors:
         BridgeError: if counts or selector are out of their range.
     """
     return Sensors(
-        Proximity(COUNTS.unpack_from(body, AT_PROXIMITY)),
-        Ambient(COUNTS.unpack_from(body, AT_AMBIENT)),
+        Proximity(UNSIGNED_COUNTS.unpack_from(body, AT_PROXIMITY)),
+        Ambient(UNSIGNED_COUNTS.unpack_from(body, AT_AMBIENT)),
         Steps(*PAIR.unpack_from(body, AT_STEPS)),
         body[AT_SELECTOR],
     )

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from epuck_mj.bridge.errors import BridgeError, RobotRestarted
+from epuck_mj.bridge.failures import BridgeError, RobotRestarted
 from epuck_mj.constants import REPLY_TIME_MAX
 
 T = TypeVar("T")
@@ -100,7 +100,7 @@ class LinesParser(Generic[T]):
     def __init__(
         self, lines: tuple[Line, ...], reply: Callable[[list[bytes]], T]
     ) -> None:
-        """For lines to come, and what makes the reply of them.
+        """Parse lines to come, and make a reply of them.
 
         Args:
             lines: in the order in which they come.
@@ -126,12 +126,12 @@ class LinesParser(Generic[T]):
             if not self._awaited:
                 self._buffer = b"\n".join([*lines[number + 1 :], self._buffer])
                 return self._reply(self._heard)
-        self._check_length(self._buffer)
+        self._refuse_long(self._buffer)
         return None
 
     def _take(self, line: bytes) -> None:
         awaited = self._awaited[0]
-        self._check_length(line)
+        self._refuse_long(line)
         if BANNER in line and awaited is not GREETING:
             raise RobotRestarted(awaited.what, line)
         if line.endswith(NOT_FOUND + b"\r"):
@@ -144,7 +144,7 @@ class LinesParser(Generic[T]):
         elif self._heard:
             self._heard.append(line)
 
-    def _check_length(self, line: bytes) -> None:
+    def _refuse_long(self, line: bytes) -> None:
         if len(line) > LINE_MAX:
             what = self._awaited[0].what
             raise BridgeError(f"{what}, in a line of at most {LINE_MAX} bytes", line)
@@ -157,7 +157,7 @@ class BytesParser(Generic[T]):
     """
 
     def __init__(self, what: str, length: int, reply: Callable[[bytes], T]) -> None:
-        """For a number of bytes, and what makes the reply of them.
+        """Parse a number of bytes, and make a reply of them.
 
         Args:
             what: the reply, for a person.
@@ -172,7 +172,7 @@ class BytesParser(Generic[T]):
 
     @property
     def rest(self) -> bytes:
-        """Always nothing: bytes after the reply raise."""
+        """No bytes, ever: those after the reply raise."""
         return b""
 
     def feed(self, data: bytes) -> T | None:

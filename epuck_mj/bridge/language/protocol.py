@@ -12,13 +12,14 @@ A link does this, and this only:
    its calibration.
 
 An e-puck2 on a serial line speaks the same `ascii` and `binary`; over WiFi it speaks
-`packets`. No firmware stops when the link is lost: say `ascii.stop()` on every way out.
+`packets`. No firmware stops when the link is lost: send `ascii.stop_order()` on every
+way out.
 
 A reply cannot name its request. That none is misread as another rests on this:
 
 - ASCII: letter, number of values, ranges. Two replies to equal requests look the same,
   so a request that was given up is followed by RESYNC, never by itself.
-- binary: length, ranges, silence before it, and in `checked_cycle` the speeds.
+- binary: length, ranges, silence before it, and in `echoed_cycle_packet` the speeds.
 
 Source: gctronic/e-puck-library, `Asercom.c`, `BTcom.c`; GCtronic's wiki, "Advanced
 sercom protocol".
@@ -26,47 +27,10 @@ sercom protocol".
 
 from dataclasses import dataclass
 
-from epuck_mj.bridge.errors import BridgeError, RobotRestarted
-from epuck_mj.bridge.language import ascii, binary, packets
-from epuck_mj.bridge.language.parsing import BANNER, Parser, Request
-from epuck_mj.bridge.language.replies import (
-    Acknowledged,
-    Ambient,
-    Battery,
-    Calibrated,
-    Cycle,
-    Proximity,
-    Restarted,
-    Sensors,
-    Speeds,
-    Steps,
-    Version,
-)
+from epuck_mj.bridge.language import ascii
+from epuck_mj.bridge.language.parsing import BANNER, Request
+from epuck_mj.bridge.language.replies import Version
 from epuck_mj.constants import OPERANDS_MAX, RESYNC_QUIET
-
-__all__ = [
-    "RESYNC",
-    "Acknowledged",
-    "Ambient",
-    "Battery",
-    "BridgeError",
-    "Calibrated",
-    "Cycle",
-    "Parser",
-    "Proximity",
-    "Request",
-    "Restarted",
-    "Resync",
-    "RobotRestarted",
-    "Sensors",
-    "Speeds",
-    "Steps",
-    "Version",
-    "ascii",
-    "binary",
-    "greets",
-    "packets",
-]
 
 
 @dataclass(frozen=True)
@@ -92,7 +56,7 @@ RESYNC = Resync(
     # operands and the end of a binary packet, or the end of a half-sent line
     flush=bytes(OPERANDS_MAX + 1) + b"\r",
     quiet=RESYNC_QUIET,
-    barrier=ascii.version(),
+    barrier=ascii.version_query(),
 )
 """The recipe for a serial line.
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from epuck_mj.bridge.errors import BridgeError
+from epuck_mj.bridge.failures import BridgeError
 from epuck_mj.constants import N_PROXIMITY, N_SELECTOR, PROXIMITY_COUNT_MAX
 
 
@@ -40,7 +40,7 @@ class Battery:
     state: str
 
     def __str__(self) -> str:
-        """For a person."""
+        """The state in words for a person."""
         return {"0": "low", "1": "good"}.get(self.state, self.state)
 
 
@@ -66,7 +66,7 @@ class Proximity:
 
     def __post_init__(self) -> None:
         """Refuse what 12 bits cannot say."""
-        _check_counts("proximity", self.counts)
+        _refuse_bad_counts("proximity", self.counts)
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Ambient:
 
     def __post_init__(self) -> None:
         """Refuse what 12 bits cannot say."""
-        _check_counts("ambient light", self.counts)
+        _refuse_bad_counts("ambient light", self.counts)
 
 
 @dataclass(frozen=True)
@@ -98,11 +98,11 @@ class Steps:
 
     def __post_init__(self) -> None:
         """Refuse what 16 bits cannot say."""
-        _check_words("step counters", (self.left, self.right))
+        _refuse_long_words("step counters", (self.left, self.right))
 
 
 @dataclass(frozen=True)
-class Speeds:
+class CommandedSpeeds:
     """The speeds last commanded, as they came; nobody measures them.
 
     Attributes:
@@ -115,7 +115,7 @@ class Speeds:
 
     def __post_init__(self) -> None:
         """Refuse what 16 bits cannot say."""
-        _check_words("commanded speeds", (self.left, self.right))
+        _refuse_long_words("commanded speeds", (self.left, self.right))
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class Sensors:
             )
 
 
-def _check_counts(name: str, counts: tuple[int, ...]) -> None:
+def _refuse_bad_counts(name: str, counts: tuple[int, ...]) -> None:
     if len(counts) != N_PROXIMITY or not all(
         0 <= count <= PROXIMITY_COUNT_MAX for count in counts
     ):
@@ -164,11 +164,11 @@ def _check_counts(name: str, counts: tuple[int, ...]) -> None:
         )
 
 
-def _check_words(name: str, values: tuple[int, ...]) -> None:
+def _refuse_long_words(name: str, values: tuple[int, ...]) -> None:
     if not all(-(2**15) <= value < 2**15 for value in values):
         raise BridgeError(f"{name} of 16 bits", f"{values}")
 
 
 def wrapped(count: int) -> int:
-    """As a signed integer of 16 bits."""
+    """The count as a signed integer of 16 bits."""
     return (count + 2**15) % 2**16 - 2**15

@@ -2,8 +2,10 @@
 
 from urllib.parse import urlsplit
 
-from epuck_mj.bridge.language.protocol import RESYNC, ascii, packets
-from epuck_mj.bridge.line.connection import Connection
+from epuck_mj.bridge.language import ascii
+from epuck_mj.bridge.language.packets import wifi_command
+from epuck_mj.bridge.language.protocol import RESYNC
+from epuck_mj.bridge.line.interfaces import Connection
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.bridge.line.serial_port import SerialPort
@@ -11,7 +13,7 @@ from epuck_mj.bridge.line.wifi_line import WifiLine
 from epuck_mj.constants import WIFI_PORT
 from epuck_mj.errors import UserError
 
-WIFI = "tcp://"
+WIFI_SCHEME = "tcp://"
 """What the name of a WiFi robot begins with."""
 
 
@@ -24,16 +26,16 @@ def connect(port: str) -> Connection:
     Raises:
         UserError: if it is no address.
     """
-    if port.startswith(WIFI):
-        name = f"socket://{port.removeprefix(WIFI)}"
+    if port.startswith(WIFI_SCHEME):
+        name = f"socket://{port.removeprefix(WIFI_SCHEME)}"
         try:
             address = urlsplit(name).netloc
         except ValueError as error:
-            raise UserError(f"expected {WIFI}host[:port], got '{port}': {error}") from (
-                None
-            )
+            raise UserError(
+                f"expected {WIFI_SCHEME}host[:port], got '{port}': {error}"
+            ) from None
         if not address.rpartition("]")[2].count(":"):
             name += f":{WIFI_PORT}"
-        return WifiLine(lambda: SerialPort(name, packets.command(0, 0)))
-    farewell = RESYNC.flush + ascii.stop().out
+        return WifiLine(lambda: SerialPort(name, wifi_command(0, 0)))
+    farewell = RESYNC.flush + ascii.stop_order().out
     return SerialLine(Link(lambda: SerialPort(port, farewell)))

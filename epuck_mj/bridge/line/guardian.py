@@ -16,15 +16,14 @@ import sys
 import time
 from collections.abc import Callable
 
-N_TIMES, PERIOD = 5, 0.2
-"""How often it says so, and the time in between [s]: bytes may be lost."""
+N_FAREWELLS, FAREWELL_PERIOD = 5, 0.2
+"""Farewells said, and the time between two [s]: bytes may be lost."""
 
-DONE = b"."
+DISMISSED = b"."
 """What a bridge says that needs no guardian any more."""
 
-
-PATIENCE = 2.0
-"""A guardian that does not go by then is killed [s]. Chosen."""
+DISMISSAL_TIME_MAX = 2.0
+"""A dismissed guardian that takes longer to go is killed [s]. Chosen."""
 
 
 def hire(fileno: Callable[[], int], farewell: bytes) -> subprocess.Popen | None:
@@ -56,7 +55,7 @@ def dismiss(process: subprocess.Popen | None) -> None:
     if process is None or process.returncode is not None:
         return
     try:
-        process.communicate(DONE, timeout=PATIENCE)
+        process.communicate(DISMISSED, timeout=DISMISSAL_TIME_MAX)
     except subprocess.TimeoutExpired:
         process.kill()
         process.communicate()
@@ -70,13 +69,13 @@ def guard(pipe: int, port: int, farewell: bytes) -> bool:
         port: file descriptor of the robot's port.
         farewell: bytes that stop the robot, whatever it heard before.
     """
-    if os.read(pipe, len(DONE)) == DONE:
+    if os.read(pipe, len(DISMISSED)) == DISMISSED:
         return False
-    for _ in range(N_TIMES):
+    for _ in range(N_FAREWELLS):
         # a robot that cannot be reached now, perhaps can a little later
         with contextlib.suppress(OSError):
             os.write(port, farewell)
-        time.sleep(PERIOD)
+        time.sleep(FAREWELL_PERIOD)
     return True
 
 

@@ -7,15 +7,13 @@ went through `protocol.RESYNC`.
 
 import time
 from collections.abc import Callable
-from typing import TypeVar
 
-from epuck_mj.bridge.errors import BridgeError, LinkLost, NoReply, RobotRestarted
-from epuck_mj.bridge.language.protocol import RESYNC, Request, greets
-from epuck_mj.bridge.line.connection import Clock, Port
+from epuck_mj.bridge.failures import BridgeError, LinkLost, NoReply, RobotRestarted
+from epuck_mj.bridge.language.parsing import Request, T
+from epuck_mj.bridge.language.protocol import RESYNC, greets
+from epuck_mj.bridge.line.interfaces import Port
 from epuck_mj.bridge.line.losable_port import LosablePort
 from epuck_mj.errors import UserError
-
-T = TypeVar("T")
 
 REOPEN_PERIOD = 0.1
 """Time between two attempts to open a lost port [s]. Chosen."""
@@ -35,7 +33,7 @@ class Link:
     def __init__(
         self,
         open_port: Callable[[], Port],
-        clock: Clock = time.monotonic,
+        clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         """Open the port.

@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 
-from epuck_mj.bridge.errors import LinkLost
-from epuck_mj.bridge.line.connection import Port
+from epuck_mj.bridge.failures import LinkLost
+from epuck_mj.bridge.line.interfaces import Port
 
 
 class LosablePort:
-    """A port that is closed as soon as it is lost; see `connection.Port`."""
+    """A port that is closed as soon as it is lost; see `interfaces.Port`."""
 
     def __init__(self, open_port: Callable[[], Port]) -> None:
         """Open it.

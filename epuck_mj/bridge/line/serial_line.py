@@ -1,26 +1,27 @@
 """A robot on a serial line: an e-puck v1 over Bluetooth, an e-puck2 over either."""
 
-from epuck_mj.bridge.errors import (
+from epuck_mj.bridge.failures import (
     BridgeError,
     LinkLost,
     RobotRestarted,
     StillMoving,
 )
-from epuck_mj.bridge.language.protocol import Cycle, ascii, binary
-from epuck_mj.bridge.line.connection import Greeting
+from epuck_mj.bridge.language import ascii, binary
+from epuck_mj.bridge.language.replies import Cycle
+from epuck_mj.bridge.line.interfaces import Greeting
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.constants import CONNECT_TIME_MAX, STOP_REPLY_TIME, STOP_TIME_MAX
 
 
 class SerialLine:
-    """See Connection.
+    """A connection over a serial line.
 
     Attributes:
         n_repairs: how often a resynchronisation was needed.
     """
 
     def __init__(self, link: Link) -> None:
-        """On a link that is open."""
+        """Take a link that is open."""
         self._link = link
         self._busy_until = 0.0
         self.n_repairs = 0
@@ -31,17 +32,17 @@ class SerialLine:
         # whatever it did before we came: first it stands still
         self._link.flush()
         try:
-            self._link.ask(ascii.stop(), self._link.clock() + STOP_REPLY_TIME)
+            self._link.ask(ascii.stop_order(), self._link.clock() + STOP_REPLY_TIME)
         except LinkLost:
             raise
         except BridgeError:
             # half a word of whoever was there before
             pass
         self._link.resync(until)
-        self._link.ask(ascii.stop(), until)
-        version = self._link.ask(ascii.version(), until)
+        self._link.ask(ascii.stop_order(), until)
+        version = self._link.ask(ascii.version_query(), until)
         try:
-            battery = str(self._link.ask(ascii.battery(), until))
+            battery = str(self._link.ask(ascii.battery_query(), until))
         except LinkLost:
             raise
         except BridgeError:
@@ -51,7 +52,7 @@ class SerialLine:
         return Greeting(", ".join(version.lines), battery)
 
     def cycle(self, left: int, right: int, changed: bool, until: float) -> Cycle:
-        """See Connection; out of step, the two find each other again until then.
+        """See Connection; while out of step, host and robot find each other again.
 
         Raises:
             BridgeError: if they did not; names what was wrong first.
@@ -67,7 +68,9 @@ class SerialLine:
                         raise RobotRestarted("a robot that goes on", "its banner")
                     # nobody knows what it has made of the last speeds
                     changed = True
-                return self._link.ask(binary.checked_cycle(left, right, changed), until)
+                return self._link.ask(
+                    binary.echoed_cycle_packet(left, right, changed), until
+                )
             except (LinkLost, RobotRestarted):
                 raise
             except BridgeError as error:
@@ -77,7 +80,7 @@ class SerialLine:
 
     def calibrate(self) -> None:
         """See Connection."""
-        request = ascii.calibrate()
+        request = ascii.calibration_order()
         self._busy_until = self._link.clock() + request.patience
         self._link.ask(request)
         self._busy_until = 0.0
@@ -94,7 +97,7 @@ class SerialLine:
                     self._link.reopen(until)
                 # at once, instead of waiting for silence as a resync does
                 self._link.flush()
-                self._link.ask(ascii.stop(), self._link.clock() + STOP_REPLY_TIME)
+                self._link.ask(ascii.stop_order(), self._link.clock() + STOP_REPLY_TIME)
                 return
             except BridgeError as error:
                 problem = error

@@ -5,7 +5,7 @@ import errno
 import serial
 from serial.tools import list_ports
 
-from epuck_mj.bridge.errors import LinkLost
+from epuck_mj.bridge.failures import LinkLost
 from epuck_mj.bridge.line import guardian
 from epuck_mj.constants import BAUD_RATE
 from epuck_mj.errors import UserError

@@ -7,10 +7,10 @@ before are old and dropped. That it stopped is seen by its step counters.
 import time
 from collections.abc import Callable
 
-from epuck_mj.bridge.errors import BridgeError, LinkLost, NoReply, StillMoving
-from epuck_mj.bridge.language.packets import PacketParser, command
+from epuck_mj.bridge.failures import BridgeError, LinkLost, NoReply, StillMoving
+from epuck_mj.bridge.language.packets import PacketParser, wifi_command
 from epuck_mj.bridge.language.replies import Cycle, Sensors, Steps
-from epuck_mj.bridge.line.connection import Clock, Greeting, Port
+from epuck_mj.bridge.line.interfaces import Greeting, Port
 from epuck_mj.bridge.line.losable_port import LosablePort
 from epuck_mj.constants import (
     CALIBRATION_TIME_MAX,
@@ -29,7 +29,7 @@ A wheel slower than 10 steps/s, 1.3 mm/s, is not noticed.
 
 
 class WifiLine:
-    """See Connection.
+    """A connection to an e-puck2 over WiFi.
 
     Attributes:
         n_repairs: none: TCP loses no byte, and what is no packet ends the drive.
@@ -40,7 +40,7 @@ class WifiLine:
     def __init__(
         self,
         open_port: Callable[[], Port],
-        clock: Clock = time.monotonic,
+        clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         """Connect.
@@ -60,7 +60,7 @@ class WifiLine:
 
     def greet(self) -> Greeting:
         """See Connection."""
-        self._port.send(command(0, 0))
+        self._port.send(wifi_command(0, 0))
         sensors = self._next(self._clock() + CONNECT_TIME_MAX)
         self.stop()
         return Greeting(
@@ -75,15 +75,15 @@ class WifiLine:
             LinkLost: if the connection is gone.
         """
         if changed:
-            self._port.send(command(left, right))
+            self._port.send(wifi_command(left, right))
         self._drop()
         sensors = self._next(until)
         return Cycle(sensors.proximity, sensors.steps)
 
     def calibrate(self) -> None:
         """See Connection; nobody says when it is done, so all its time goes by."""
-        self._port.send(command(0, 0, calibrate=True))
-        self._port.send(command(0, 0))
+        self._port.send(wifi_command(0, 0, calibrate=True))
+        self._port.send(wifi_command(0, 0))
         end = self._clock() + CALIBRATION_TIME_MAX
         while self._clock() < end:
             self._next(end + WIFI_PERIOD + STOP_REPLY_TIME)
@@ -112,7 +112,7 @@ class WifiLine:
 
     def _rests(self) -> bool:
         """Whether it stands after it was told to."""
-        self._port.send(command(0, 0))
+        self._port.send(wifi_command(0, 0))
         self._drop()
         # commands wait for their turn: what it does now says nothing yet
         self._next(self._clock() + STOP_REPLY_TIME)

@@ -74,9 +74,9 @@ def _class_shares(data: StudyData, robot: str) -> dict[str, dict[str, float]]:
         shares = class_means(data, name, robot)
         if shares:
             found[with_count(name, len(runs))] = shares
-    hand_written = data.yardstick.get(robot, {}).get("behaviour")
-    if hand_written:
-        found[HAND_WRITTEN] = dict(hand_written)
+    hand_written = data.yardstick.get(robot)
+    if hand_written and hand_written.behaviour:
+        found[HAND_WRITTEN] = dict(hand_written.behaviour)
     return found
 
 

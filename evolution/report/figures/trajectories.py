@@ -6,10 +6,10 @@ from matplotlib.collections import LineCollection, QuadMesh
 from matplotlib.figure import Figure
 
 from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.show.figures import trajectory_figure
 from epuck_mj.trials.recorder import record
-from evolution.judging.held_out import WHEELED_ROBOT
 from evolution.judging.starts import starts_for_test
 from evolution.pages.style import PAGE, PRINT, with_count
 from evolution.pages.words import PAPERS, label

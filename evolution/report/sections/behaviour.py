@@ -1,5 +1,7 @@
 """Behaviour: what champions do, and how close to the wall they ride."""
 
+import math
+
 from epuck_mj.trials.behaviour_classes import HUG, MEANINGS
 from epuck_mj.trials.metrics import FOLLOWING_SHARE
 from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
@@ -15,9 +17,7 @@ from evolution.pages.words import (
 from evolution.report.measures import shown_robots
 from evolution.report.samples import (
     class_means,
-    clearance,
     clearances,
-    whole_lap_share,
     whole_laps,
 )
 from evolution.study.data import StudyData
@@ -51,17 +51,17 @@ def behaviour_section(data: StudyData) -> list[Block]:
             )
         )
     for robot in shown_robots(data):
-        test = data.yardstick.get(robot, {})
-        if test.get("behaviour"):
-            near = clearance(test)
+        test = data.yardstick.get(robot)
+        if test and test.behaviour:
+            near = test.clearance
             rows.append(
                 (
                     YARDSTICK_LABEL,
                     robot_name(robot),
-                    *(percent(test["behaviour"].get(c, 0.0)) for c in seen),
-                    NOTHING if near is None else f"{near * 1000:.1f}",
+                    *(percent(test.behaviour.get(c, 0.0)) for c in seen),
+                    NOTHING if math.isnan(near) else f"{near * 1000:.1f}",
                     NOTHING,
-                    percent(whole_lap_share(test)),
+                    percent(test.whole_laps),
                 )
             )
     return [

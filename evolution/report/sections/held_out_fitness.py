@@ -1,5 +1,7 @@
 """Held-out fitness: the main table, and the same with noise."""
 
+import numpy as np
+
 from evolution.pages.blocks import Block, Heading, Paragraph, Table
 from evolution.pages.words import (
     NOTHING,
@@ -12,7 +14,7 @@ from evolution.pages.words import (
     spread,
 )
 from evolution.report.measures import shown_robots
-from evolution.report.samples import known, tests_of
+from evolution.report.samples import crash_rates, tests_of
 from evolution.study.data import StudyData
 
 
@@ -24,16 +26,14 @@ def held_out_fitness_section(data: StudyData) -> list[Block]:
         row = [label(name), str(len(runs))]
         for robot in robots:
             sample = data.held_out(name, robot)
-            crashes = known(tests_of(data, name, robot), "crash_rate")
+            crashes = crash_rates(tests_of(data, name, robot))
             row += [spread(sample), f"{sample.max():.1f}", percent_median(crashes)]
         rows.append([*row, spread(data.best_stored(name))])
     if data.yardstick:
         row = [YARDSTICK_LABEL, NOTHING]
         for robot in robots:
-            test = data.yardstick.get(robot, {})
-            mean = test.get("mean")
-            row += ["-" if mean is None else f"{mean:.1f}", NOTHING]
-            row.append(percent(test.get("crash_rate")))
+            test = data.yardstick[robot]
+            row += [f"{test.mean:.1f}", NOTHING, percent(test.crash_rate)]
         rows.append([*row, NOTHING])
     columns = ["experiment", "n"]
     for robot in robots:
@@ -53,17 +53,17 @@ def held_out_fitness_section(data: StudyData) -> list[Block]:
 
 
 def _as_evolved(data: StudyData) -> list[Block]:
-    """The same on disturbed robots, of experiments that evolved on such."""
+    """Held-out fitness on disturbed robots, of experiments that evolved on such."""
     rows = []
     for name, runs in data.with_runs.items():
-        found = [run.champion.scores.get("held_out_as_evolved") for run in runs]
+        found = [run.scores.held_out_as_evolved for run in runs]
         tests = [each for each in found if each]
         if tests:
             row = [label(name), str(len(tests))]
             for robot in shown_robots(data):
-                row.append(spread(known([each[robot] for each in tests], "mean")))
-                crashes = known([each[robot] for each in tests], "crash_rate")
-                row.append(percent_median(crashes))
+                on_robot = [each[robot] for each in tests]
+                row.append(spread(np.array([test.mean for test in on_robot])))
+                row.append(percent_median(crash_rates(on_robot)))
             rows.append(row)
     if not rows:
         return []

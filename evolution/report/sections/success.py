@@ -10,7 +10,7 @@ from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
 from evolution.pages.words import YARDSTICK_LABEL, label, probability, robot_name
 from evolution.report.contests import Contest, contests
 from evolution.report.measures import shown_robots
-from evolution.report.samples import FOLLOWING, following_share
+from evolution.report.samples import FOLLOWING
 from evolution.statistics.estimates import Interval, wilson
 from evolution.statistics.significance import FEWEST_FOR_STARS, LEVELS, fisher
 from evolution.study.data import RunData, StudyData
@@ -74,13 +74,9 @@ def _criteria(data: StudyData, robot: str) -> dict[str, Callable[[RunData], bool
     if reference is not None:
         found[MATCHES] = lambda run: run.held_out(robot) >= reference
     everything = [run for runs in data.runs.values() for run in runs]
-    if all(_test_of(run, robot).get("behaviour") for run in everything):
-        found[FOLLOWS] = lambda run: following_share(_test_of(run, robot)) >= FOLLOWING
+    if all(run.scores.held_out[robot].behaviour for run in everything):
+        found[FOLLOWS] = lambda run: run.scores.held_out[robot].following >= FOLLOWING
     return found
-
-
-def _test_of(run: RunData, robot: str) -> Any:
-    return run.champion.scores["held_out"][robot]
 
 
 SUCCESS_COLUMNS = (

@@ -18,7 +18,7 @@ def what_was_run_section(data: StudyData) -> list[Block]:
     runs = data.with_runs
     sizes = sorted({len(each) for each in runs.values()})
     starts = {
-        test["starts"]
+        test.starts
         for name in runs
         for robot in data.robots
         for test in tests_of(data, name, robot)

@@ -13,7 +13,7 @@ import epuck_mj
 import evolution
 from epuck_mj.errors import UserError
 from epuck_mj.scene.model import load_scene
-from evolution.judging.held_out import WHEELED_ROBOT
+from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.settings.config import ExperimentConfig
 
 DECIDING = ("epuck-mj", "mujoco", "numpy", "scipy", "contourpy", "cmaes")

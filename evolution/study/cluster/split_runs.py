@@ -8,7 +8,7 @@ from contextlib import closing
 from epuck_mj.scene.model import load_scene
 from epuck_mj.step.control import TaskParameters, Trials
 from evolution.judging.evaluation import CAPACITY, BatchEngine, Work
-from evolution.run.execution import Means
+from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 from evolution.study.cluster.connection import Cluster, ClusterLost
 from evolution.study.cluster.requirements import Requirements, requirements_of

@@ -13,7 +13,7 @@ from distributed import Future, get_worker
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from evolution.run.directory import RunDirectory
-from evolution.run.execution import Means
+from evolution.run.means import Means
 from evolution.study.cluster.connection import LOOK_AFTER, Cluster, ClusterLost
 from evolution.study.cluster.requirements import Requirements, requirements_of
 from evolution.study.jobs import (

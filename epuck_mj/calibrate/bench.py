@@ -13,8 +13,8 @@ from typing import TypeVar
 import numpy as np
 
 from epuck_mj.bridge.drive.robot import RealRobot
-from epuck_mj.bridge.errors import BridgeError, StillMoving
-from epuck_mj.bridge.line.connection import Clock, Connection
+from epuck_mj.bridge.failures import BridgeError, StillMoving
+from epuck_mj.bridge.line.interfaces import Connection
 from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import Interruption
 from epuck_mj.step.calibration import Calibration
@@ -29,10 +29,10 @@ A little more than PROXIMITY_PERIOD: more readings would tell the same again.
 """
 
 RATE = 300
-"""Of the wheels where only the way counts [steps/s]."""
+"""Speed of the wheels where only the way counts [steps/s]."""
 
 N_STEPS = 4000
-"""Way straight on: 0.52 m, of which a ruler's millimetre is 0.2 %."""
+"""Steps straight on: 0.52 m, of which a ruler's millimetre is 0.2 %."""
 
 N_TURNS = 3
 """Turns on the spot, of which one degree is 0.1 %."""
@@ -66,7 +66,7 @@ class Bench:
 
     connect: Callable[[], Connection]
     interruption: Interruption
-    clock: Clock
+    clock: Callable[[], float]
     sleep: Callable[[float], None]
 
     def with_robot(self, calibration: Calibration, job: Callable[[RealRobot], T]) -> T:
@@ -102,7 +102,7 @@ def zero(bench: Bench, calibration: Calibration) -> None:
     bench.with_robot(calibration, RealRobot.calibrate)
 
 
-def straight(bench: Bench, calibration: Calibration) -> float:
+def drive_straight(bench: Bench, calibration: Calibration) -> float:
     """Drive straight on for about N_STEPS; the steps that the motors made."""
 
     def job(robot: RealRobot) -> float:
@@ -113,7 +113,7 @@ def straight(bench: Bench, calibration: Calibration) -> float:
     return bench.with_robot(calibration, job)
 
 
-def turn(bench: Bench, calibration: Calibration) -> float:
+def turn_on_the_spot(bench: Bench, calibration: Calibration) -> float:
     """Turn left for about N_TURNS; the steps that each motor made."""
 
     def job(robot: RealRobot) -> float:
@@ -158,7 +158,7 @@ def look_around(
 
 
 def steps_per_turn(calibration: Calibration) -> float:
-    """Of each motor, one forward, one backward."""
+    """Steps of each motor in a turn on the spot, one forward, one backward."""
     return math.pi * calibration.track / (calibration.wheel_radius * STEP_ANGLE)
 
 

@@ -1,13 +1,9 @@
 """What a bridge asks of a port and of a robot, whichever they are."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
 from epuck_mj.bridge.language.replies import Cycle
-
-Clock = Callable[[], float]
-"""Seconds, from anywhere, never going back."""
 
 
 class Port(Protocol):
@@ -56,8 +52,8 @@ class Connection(Protocol):
         """What it senses now.
 
         Args:
-            left: wheel speed [steps/s] that it drives at, or has to if it `changed`.
-            right: likewise.
+            left: speed [steps/s] of the left wheel, new if it `changed`.
+            right: speed [steps/s] of the right wheel.
             changed: whether the robot has to be told.
             until: when to give up, by the clock.
         """

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from epuck_mj.bridge.errors import LinkLost
+from epuck_mj.bridge.failures import LinkLost
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.line.serial_port import POLL_TIME
 from epuck_mj.errors import UserError
@@ -64,7 +64,7 @@ class VirtualTime:
 
 
 class VirtualPort:
-    """Where a host meets a robot in virtual time; see `connection.Port`."""
+    """Where a host meets a robot in virtual time; see `interfaces.Port`."""
 
     def __init__(self, time: VirtualTime) -> None:
         """Open it.
@@ -81,21 +81,21 @@ class VirtualPort:
 
     def send(self, data: bytes) -> None:
         """See Port."""
-        self._check()
+        self._refuse_lost()
         self._time.send(data)
 
     def receive(self, timeout: float) -> bytes:
         """See Port."""
-        self._check()
+        self._refuse_lost()
         data = self._time.receive(min(timeout, POLL_TIME))
-        self._check()
+        self._refuse_lost()
         return data
 
     def close(self) -> None:
         """See Port."""
         self._is_open = False
 
-    def _check(self) -> None:
+    def _refuse_lost(self) -> None:
         # a port that returns is another one
         whole = self._time.connected and self._time.cuts == self._cuts
         if not self._is_open or not whole:

@@ -25,7 +25,7 @@ HEADING = (
 )
 
 
-def summary(session: Session, robot: RealRobot) -> str:
+def drive_summary(session: Session, robot: RealRobot) -> str:
     """What a session came to, a fact a line."""
     steps = session.steps
     fitness = sum(float(step.control.fitness) for step in steps)

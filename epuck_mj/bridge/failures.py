@@ -2,6 +2,12 @@
 
 from epuck_mj.errors import UserError
 
+DONE, FAILED, RUNAWAY = 0, 3, 4
+"""Exit statuses: as planned; broken off, standing still; perhaps still moving.
+
+Beside 2 for what a user can put right before it starts, and 128 + signal.
+"""
+
 
 class BridgeError(UserError):
     """Not what was expected of the robot, or of what it is told.
@@ -18,7 +24,7 @@ class BridgeError(UserError):
         self.came = came if isinstance(came, str) else _shown(came)
 
     def __str__(self) -> str:
-        """One line."""
+        """What was expected and what came, on one line."""
         return f"expected {self.expected}; came {self.came}"
 
 
@@ -30,7 +36,7 @@ class RobotRestarted(BridgeError):
 
 
 class NoReply(BridgeError):
-    """Nothing, or not enough, came in time."""
+    """The reply did not come in time, or not all of it."""
 
 
 class LinkLost(BridgeError):

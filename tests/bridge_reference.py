@@ -113,6 +113,18 @@ def nominal(
     return np.array(poses)
 
 
+def drive_steps(journal: Journal) -> list[int]:
+    """Physics steps made when each command came that moved the robot."""
+    rows = zip(journal.command_step, journal.command, strict=True)
+    return [step for step, row in rows if row[0] or row[2]]
+
+
+def at_control_steps(scene: Scene, journal: Journal, n_steps: int) -> np.ndarray:
+    """Poses `(n, 3)` from the first command on, a control step apart."""
+    first = drive_steps(journal)[0]
+    return np.array(journal.pose)[first :: scene.n_substeps][: n_steps + 1]
+
+
 def deviation(poses: np.ndarray, others: np.ndarray) -> tuple[float, float]:
     """Largest distance [m] and difference of direction [rad] of poses `(n, 3)`."""
     moved = np.linalg.norm(poses[:, :2] - others[:, :2], axis=1)

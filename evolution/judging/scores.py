@@ -1,0 +1,163 @@
+"""Scores: what a champion is worth, as its file says it.
+
+Read with `read`, which refuses what is no score, and written with `to_dict`, which
+leaves out what is not known.
+"""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import BaseModel, Field, StrictFloat, StrictInt, ValidationError
+
+from epuck_mj.errors import UserError
+
+
+class _Record(BaseModel, frozen=True, allow_inf_nan=False):
+    """Values that are read from a file and written to one."""
+
+    @classmethod
+    def read(cls, fields: Mapping[str, Any], path: Path) -> Self:
+        """What the file at `path` says; keys that are unknown say nothing.
+
+        Raises:
+            UserError: naming the first value that is missing or no score.
+        """
+        try:
+            return cls.model_validate(fields)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, first["loc"])) or "scores"
+            raise UserError(f"'{path}' is damaged: {where}: {first['msg']}") from None
+
+    def to_dict(self) -> dict[str, Any]:
+        """All that is known as plain values, in the order of the attributes."""
+        return self.model_dump(exclude_unset=True)
+
+
+class HeldOut(_Record, frozen=True):
+    """A controller on `starts` fresh starts.
+
+    Older files know less: there, numbers are nan and mappings empty.
+
+    Attributes:
+        mean: fitness over the starts.
+        standard_deviation: of the fitness of a start.
+        interval: bootstrap 95 % confidence bounds of the mean.
+        worst: mean of the worst 5 % of the starts.
+        crash_rate: share of the trials that ended in a crash.
+        collisions_per_minute: crashes per minute lived.
+        starts: how many there were, 2 or more: one has no spread.
+        behaviour: share of the trials by behaviour class.
+        metrics: mean of each of `trials.metrics.Behaviour` over the trials that have
+            it, None if none has.
+    """
+
+    mean: StrictFloat
+    standard_deviation: StrictFloat = math.nan
+    interval: tuple[StrictFloat, StrictFloat] = (math.nan, math.nan)
+    worst: StrictFloat = math.nan
+    crash_rate: StrictFloat
+    collisions_per_minute: StrictFloat = math.nan
+    starts: StrictInt = Field(ge=2)
+    behaviour: Mapping[str, StrictFloat] = {}
+    metrics: Mapping[str, StrictFloat | None] = {}
+
+    @property
+    def following(self) -> float:
+        """Share of the trials that followed walls, hugging or not; nan if unknown."""
+        shares = self.behaviour
+        follows = shares.get("wall follower", 0.0) + shares.get("hugger", 0.0)
+        return follows if shares else math.nan
+
+    @property
+    def clearance(self) -> float:
+        """Mean clearance near walls [m]; nan if unknown, or never near one."""
+        return self._metric("clearance_mean")
+
+    @property
+    def whole_laps(self) -> float:
+        """Share of the trials with a whole lap; nan if unknown."""
+        return self._metric("success")
+
+    def _metric(self, name: str) -> float:
+        value = self.metrics.get(name)
+        return math.nan if value is None else value
+
+
+class Believed(_Record, frozen=True):
+    """The individual with the highest stored fitness of a run.
+
+    Attributes:
+        stored: that fitness.
+        held_out: its mean on the test starts, on ideal robots.
+    """
+
+    stored: StrictFloat
+    held_out: StrictFloat
+
+
+class Scores(_Record, frozen=True):
+    """What a champion is worth.
+
+    Attributes:
+        stored: fitness that evolution believes in.
+        validation: mean on the validation starts, which chose it; nan if unknown.
+        held_out: tests on the test starts by robot, the one it evolved on first.
+        most_believed: the individual that the run believed most in; None if unknown.
+        held_out_as_evolved: tests with the disturbances it evolved with, by robot.
+    """
+
+    stored: StrictFloat
+    validation: StrictFloat = math.nan
+    held_out: Mapping[str, HeldOut] = Field(min_length=1)
+    most_believed: Believed | None = None
+    held_out_as_evolved: Mapping[str, HeldOut] = {}
+
+    def in_lines(self, steps: int) -> str:
+        """Held-out fitness on each robot and stored fitness, of `steps`, in lines."""
+        starts = next(iter(self.held_out.values())).starts
+        lines = [
+            f"Held-out fitness of {steps}, mean of {starts} fresh starts: "
+            + _in_words(self.held_out),
+            f"Stored fitness of {steps}, what evolution believes: {self.stored:.1f}",
+        ]
+        if self.held_out_as_evolved:
+            disturbed = _in_words(self.held_out_as_evolved)
+            lines.insert(
+                1, f"The same with the disturbances it evolved with: {disturbed}"
+            )
+        return "\n".join(lines)
+
+    @property
+    def in_short(self) -> str:
+        """Held-out fitness on each robot and stored fitness, in part of a line."""
+        return f"held-out {_in_words(self.held_out)}; stored {self.stored:.1f}"
+
+
+def _in_words(tests: Mapping[str, HeldOut]) -> str:
+    return ", ".join(
+        f"{robot} {test.mean:.1f} ({test.crash_rate:.0%} crash)"
+        for robot, test in tests.items()
+    )
+
+
+class KnownScores(Scores, frozen=True):
+    """Scores of any policy: all may be unknown, stored and held-out fitness as well."""
+
+    stored: StrictFloat = math.nan
+    held_out: Mapping[str, HeldOut] = {}
+
+    @classmethod
+    def found_in(cls, fields: Mapping[str, Any]) -> Self:
+        """Scores of a file that anybody may have made; what is none is left out."""
+        sound = dict(fields)
+        while True:
+            try:
+                return cls.model_validate(sound)
+            except ValidationError as error:
+                key, *inside = map(str, error.errors()[0]["loc"])
+            tests = sound.pop(key)
+            if key == "held_out" and inside:
+                sound[key] = {name: tests[name] for name in tests if name != inside[0]}

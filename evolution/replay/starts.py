@@ -1,0 +1,155 @@
+"""Where replayed trials happen: the scene and the starts that a person asks for."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from epuck_mj.errors import UserError
+from epuck_mj.scene.geometry import arena_box
+from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.conditions import Conditions
+from epuck_mj.step.disturbances import Disturbances
+from evolution.judging.starts import (
+    N_TEST,
+    N_VALIDATION,
+    held_out_disturbances,
+    starts_for_test,
+    starts_for_validation,
+)
+from evolution.named_policies import NamedPolicy
+from evolution.replay.options import Options
+from evolution.settings.randomness import Purpose
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Starts that trials begin from.
+
+    Attributes:
+        names: of each, `n` of them.
+        poses: `(n, 3)`: x, y [m], yaw [rad].
+        purpose: of the held-out starts that they are among.
+        total: how many of these there are.
+        first: number of the first among them.
+    """
+
+    names: tuple[str, ...]
+    poses: np.ndarray
+    purpose: Purpose = Purpose.TEST
+    total: int = N_TEST
+    first: int = 0
+
+    @classmethod
+    def none(cls) -> Self:
+        """No starts, for recorded trajectories."""
+        return cls((), np.zeros((0, 3)))
+
+    @classmethod
+    def from_pose(cls, pose: np.ndarray) -> Self:
+        """The start that a person asks for, `(3,)`; it meets what test start 0 does."""
+        return cls(("pose",), pose[None])
+
+    def met(self, conditions: Conditions, steps: int) -> Disturbances | None:
+        """What trials from here meet: as in the held-out test of all starts."""
+        everything = held_out_disturbances(conditions, self.purpose, self.total, steps)
+        if everything is None:
+            return None
+        return everything[self.first : self.first + len(self.names)]
+
+
+def numbered_starts(spec: str, scene: Scene, clearance: float) -> Starts:
+    """Starts that a person names, such as `test:0-9` or `validation:3`.
+
+    Raises:
+        UserError: if it names none.
+    """
+    sizes = {"test": N_TEST, "validation": N_VALIDATION}
+    found = re.fullmatch(r"(\w+):(\d{1,9})(?:-(\d{1,9}))?", spec)
+    if not found or found[1] not in sizes:
+        raise UserError(
+            f"expected starts such as test:0, test:0-9 or validation:7, got '{spec}'"
+        )
+    name, first, last = found[1], int(found[2]), int(found[3] or found[2])
+    if not first <= last < sizes[name]:
+        raise UserError(
+            f"expected {name} starts from 0 to {sizes[name] - 1}, the lower number "
+            f"first, got '{spec}'"
+        )
+    space = FreeSpace(scene, clearance)
+    if name == "test":
+        purpose, poses = Purpose.TEST, starts_for_test(space, last + 1)
+    else:
+        purpose, poses = Purpose.VALIDATION, starts_for_validation(space)
+    names = tuple(f"{name} {i}" for i in range(first, last + 1))
+    return Starts(names, poses[first : last + 1], purpose, sizes[name], first)
+
+
+def scene_for(options: Options, policies: Sequence[NamedPolicy]) -> Scene:
+    """The one scene that everybody drives in.
+
+    Raises:
+        UserError: if the policies do not agree on it.
+    """
+    arenas = dict.fromkeys(policy.arena for policy in policies) or {"arena": None}
+    if options.arena is None and len(arenas) > 1:
+        raise UserError(
+            f"evolved in different arenas ({', '.join(arenas)}): expected --arena to "
+            "say in which they are to be compared"
+        )
+    control_steps = {policy.task.control_step for policy in policies} or {0.1}
+    if len(control_steps) > 1:
+        raise UserError(
+            f"expected policies with the same control step, got {sorted(control_steps)}"
+        )
+    arena = options.arena or next(iter(arenas))
+    return load_scene(options.robot, arena, control_steps.pop())
+
+
+def starts_for(
+    options: Options, scene: Scene, policies: Sequence[NamedPolicy]
+) -> Starts:
+    """The starts that were asked for.
+
+    Raises:
+        UserError: if they are no starts, or asked for in several ways.
+    """
+    ways = (options.trials, options.starts, options.pose or None)
+    if sum(way is not None for way in ways) > 1:
+        raise UserError("expected one of --trials, --starts and --pose, got several")
+    if not policies and (any(ways) or options.generations is not None):
+        raise UserError(
+            "expected a policy for --trials, --starts, --pose or --generations: a "
+            "recorded trajectory is what it is"
+        )
+    if options.pose:
+        if len(options.pose) != 3 or not np.isfinite(options.pose).all():
+            raise UserError(
+                "expected --pose with x [m], y [m] and heading [degrees], got "
+                + " ".join(f"{number:g}" for number in options.pose)
+            )
+        return Starts.from_pose(_pose(scene, *options.pose))
+    trials = 1 if options.trials is None else options.trials
+    if trials < 1:
+        raise UserError(f"expected at least 1 trial, got {trials}")
+    if not policies:
+        return Starts.none()
+    # the widest: a start that is free for one is free for all
+    clearance = max(policy.start_clearance for policy in policies)
+    spec = options.starts or f"test:0-{trials - 1}"
+    return numbered_starts(spec, scene, clearance)
+
+
+def _pose(scene: Scene, x: float, y: float, degrees: float) -> np.ndarray:
+    """A pose `(3,)` between the walls, wherever they are."""
+    lower, upper = arena_box(scene.model)
+    if not ((lower[:2] <= (x, y)) & ((x, y) <= upper[:2])).all():
+        raise UserError(
+            f"expected --pose in the arena, x from {lower[0]:g} to {upper[0]:g} and y "
+            f"from {lower[1]:g} to {upper[1]:g}, got {x:g} {y:g}"
+        )
+    return np.array([x, y, math.radians(math.remainder(degrees, 360))])
