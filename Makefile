@@ -48,14 +48,14 @@ gap: $(INSTALLED)
 
 # what git keeps of the studies in runs/, and everything that is made of it
 results: $(INSTALLED)
-	$(BIN)/python -m benchmarks.publish
+	$(BIN)/python -m evolution.reproduce.publish
 
 # all pictures; the first needs EGL or OSMesa, the second a Vulkan driver
 figures: $(INSTALLED)
 	$(BIN)/python -m evolution.replay $(CHAMPION) --image docs/champion.png
 	$(BIN)/python -m evolution.replay $(CHAMPION) --generations 0,10,50,last \
 	  --save runs/generations.rrd
-	$(BIN)/python -m benchmarks.viewer_picture runs/generations.rrd \
+	$(BIN)/python -m evolution.replay.viewer_picture runs/generations.rrd \
 	  --output docs/replay.png --size 1400 875
 	$(BIN)/python -m evolution.report results/paper --output results/report-paper
 

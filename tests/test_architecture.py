@@ -66,14 +66,16 @@ ALLOWED_IN = {
     "dm_control": ("epuck_mj/environments/",),
     "dm_env": ("epuck_mj/environments/",),
     "imageio_ffmpeg": ("epuck_mj/show/video.py",),
+    "markdown_it": ("evolution/pages/blocks.py",),
     "matplotlib": (
         "epuck_mj/check/picture.py",
         "epuck_mj/show/",
         "evolution/gap/figure.py",
-        "evolution/pages/",
+        "evolution/pages/figure_files.py",
+        "evolution/pages/style.py",
         "evolution/report/figures/",
     ),
-    "rerun": ("epuck_mj/show/recording/",),
+    "rerun": ("epuck_mj/show/recording/", "evolution/replay/viewer_picture.py"),
     "serial": ("epuck_mj/bridge/line/serial_port.py",),
     "yaml": ("epuck_mj/host/yaml_and_json.py",),
 }

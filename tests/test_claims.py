@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from evolution.judging.scores import Believed, HeldOut, Scores
-from evolution.report.pairs import pair_rows, pairs_of
+from evolution.report.sections.comparisons import comparisons, comparisons_of
 from evolution.reproduce.claims import (
     Claim,
     claims,
@@ -18,8 +18,8 @@ from evolution.reproduce.claims import (
     tally,
     unlike,
 )
-from evolution.reproduce.document import reproduction
 from evolution.reproduce.first_generation import FirstGeneration, first_generation
+from evolution.reproduce.reproduction import reproduction
 from evolution.reproduce.verdicts import (
     CONSISTENT,
     HANGS_ON_READING,
@@ -144,9 +144,7 @@ def test_orders_are_adjusted_for_their_number():
     }
     found = claims(study({}, runs=runs))
     assert verdict(found, "DE/best", "exceeds", "GA", "stored") == UNDECIDED
-    assert not any(
-        row.decided for row in pairs_of("stored", samples, lambda a, b: True)
-    )
+    assert not any(row.decided for row in comparisons_of(samples, lambda a, b: True))
 
 
 @pytest.mark.parametrize(
@@ -323,8 +321,8 @@ def test_held_out_orders_are_decided_as_in_the_report():
     assert verdict(found, "DE/best", "exceeds", "GA") == UNDECIDED
     (row,) = [
         row
-        for row in pair_rows(together)
-        if (row.measure, row.a, row.b) == ("held-out epuck", "de-best", "ga")
+        for row in comparisons(together)["held-out epuck"]
+        if (row.a, row.b) == ("de-best", "ga")
     ]
     assert row.family == 15 and not row.decided
 

@@ -15,17 +15,17 @@ from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.motors import Speeds
 from evolution.gap import worlds as gap_worlds
-from evolution.gap.__main__ import gap
-from evolution.gap.document import document
+from evolution.gap.__main__ import measure_gap
+from evolution.gap.gap_document import gap_document
 from evolution.gap.groups import experiments, peers
-from evolution.gap.measure import Outcome, abroad, ideal
+from evolution.gap.outcomes import Outcome, abroad, ideal
 from evolution.gap.transfer import (
     Transfer,
     between_robots,
     rank_correlations,
     verdict,
 )
-from evolution.gap.worlds import ARENAS, LATENCY_MAX, RANGES, World, met, worlds
+from evolution.gap.worlds import ARENAS, LATENCY_MAX, WORLD_RANGES, World, met, worlds
 from evolution.named_policies import NamedPolicy, named_policies
 from evolution.pages.blocks import to_markdown
 
@@ -50,7 +50,7 @@ FOLLOWER = NamedPolicy("wall-follower", WallFollower(), TaskParameters(steps=100
 def test_a_hypercube_covers_every_range_evenly():
     n = 40
     found = worlds(n)
-    for name, (low, high) in RANGES.items():
+    for name, (low, high) in WORLD_RANGES.items():
         values = np.array([getattr(world, name) for world in found])
         values = np.log(values) if name == "curve" else values
         part = np.floor((values - low) / (high - low) * n).astype(int)
@@ -224,7 +224,7 @@ def test_the_document_says_who_kept_what():
     names = ["a/seed-1", "a/seed-2", "b"]
     groups = {"a": [0, 1], "b": [2]}
     transfers, peers_of = {"epuck": TRANSFER}, {"0.1 m/s": [0, 1, 2]}
-    text = to_markdown(document(names, transfers, groups, peers_of, 5, LATENCY))
+    text = to_markdown(gap_document(names, transfers, groups, peers_of, 5, LATENCY))
     assert "3 policies, frozen, in 4 worlds" in text
     assert "| a | a/seed-1 | 0.500 |" in text
     assert "50% [15%, 85%]" in text
@@ -238,7 +238,7 @@ def test_the_document_says_who_kept_what():
     )
     both = {"epuck": more, "epuck_planar": more}
     ranked = to_markdown(
-        document(list("abcde"), both, groups, {"0.1 m/s": range(5)}, 5, LATENCY)
+        gap_document(list("abcde"), both, groups, {"0.1 m/s": range(5)}, 5, LATENCY)
     )
     assert "- 5 policies of 0.1 m/s, epuck: between home and a world, " in ranked
     assert "by mean fitness over the worlds, 1.00" in ranked
@@ -251,7 +251,7 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys):
     output = tmp_path / "new" / "gap"
     arguments = ["wall-follower", str(CHAMPION), "--output", str(output)]
     small = ["--worlds", "3", "--starts", "2", "--robot", "epuck_planar"]
-    assert gap([*arguments, *small]) == 0
+    assert measure_gap([*arguments, *small]) == 0
     names = {path.name for path in output.iterdir()}
     pictures = {"gap.png", "gap.svg", "gap.pdf"}
     assert names == {"gap.md", "summary.md", "gap.json", "gap.csv", *pictures}
@@ -271,7 +271,7 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys):
         assert row["arena"] == record["worlds"][int(row["world"])]["arena"]
     assert imread(output / "gap.png").shape[1] > 1000
     first = (output / "gap.json").read_bytes()
-    assert gap([*arguments, *small]) == 0
+    assert measure_gap([*arguments, *small]) == 0
     assert (output / "gap.json").read_bytes() == first
 
 
@@ -288,7 +288,7 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys):
 )
 def test_bad_input_is_one_line(arguments, words, tmp_path):
     with pytest.raises(UserError, match=words) as error:
-        gap([*arguments, "--output", str(tmp_path / "gap")])
+        measure_gap([*arguments, "--output", str(tmp_path / "gap")])
     assert "\n" not in str(error.value)
 
 

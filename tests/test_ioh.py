@@ -6,7 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evolution.report.ioh import FUNCTION, HEADER, LOWEST, export, improvements
+from evolution.report.ioh import (
+    FUNCTION,
+    HEADER,
+    LOWEST,
+    export_histories,
+    improvements,
+)
 from evolution.study.data import RunData, load_study
 from tests.study_on_disk import LEVELS, history, write_study
 
@@ -17,7 +23,7 @@ SEEDS = {"de-best": [1, 2, 7], "ga": [3], "de-rand": []}
 def exported(tmp_path_factory):
     place = tmp_path_factory.mktemp("ioh")
     data = load_study(write_study(place / "study", SEEDS))
-    export(data, place / "ioh")
+    export_histories(data, place / "ioh")
     return data, place / "ioh"
 
 

@@ -15,9 +15,9 @@ import rerun.blueprint as rrb
 from matplotlib.image import imread
 from rerun.experimental import ViewerClient
 
-from benchmarks.viewer_picture import picture, viewer
 from epuck_mj.errors import UserError
 from evolution.replay.__main__ import replay
+from evolution.replay.viewer_picture import headless_viewer, viewer_screenshot
 from tests.browser import MISSING, browser, until
 from tests.processes import PATIENCE, python_process
 
@@ -35,7 +35,7 @@ def window(recording: Path, size: tuple[int, int]) -> Iterator[ViewerClient]:
     """A viewer of a recording; a reason to skip where no Vulkan driver is."""
     with ExitStack() as stack:
         try:
-            client = stack.enter_context(viewer(recording, size))
+            client = stack.enter_context(headless_viewer(recording, size))
         except UserError as error:
             if "Vulkan" not in str(error):
                 raise
@@ -45,7 +45,7 @@ def window(recording: Path, size: tuple[int, int]) -> Iterator[ViewerClient]:
 
 def seen(client: ViewerClient, seconds: float) -> np.ndarray:
     """The whole window at a time, once it no longer changes."""
-    return imread(io.BytesIO(picture(client, seconds)))
+    return imread(io.BytesIO(viewer_screenshot(client, seconds)))
 
 
 def seen_of(client: ViewerClient, view: str) -> np.ndarray | None:

@@ -15,11 +15,13 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from markdown_it import MarkdownIt
 from scipy import stats
 
 from epuck_mj.errors import UserError
 from evolution.judging.scores import HeldOut
 from evolution.pages.blocks import (
+    STYLE,
     Code,
     Heading,
     Listing,
@@ -29,18 +31,27 @@ from evolution.pages.blocks import (
     to_html,
     to_markdown,
 )
-from evolution.pages.files import csv_text
+from evolution.pages.csv_text import csv_text
 from evolution.pages.words import spread
-from evolution.report import __main__ as module
-from evolution.report.__main__ import report, tables
-from evolution.report.findings import WITH_NOISE, held_out_fitness, luck
-from evolution.report.pairs import compared, pair_rows
+from evolution.report.__main__ import report_study, tables
+from evolution.report.measures import BEST_STORED
+from evolution.report.run_table import run_rows
 from evolution.report.samples import TARGET_SHARES
-from evolution.report.successes import FOLLOWS, MATCHES, success_rows
-from evolution.report.summary import summary, summary_text
-from evolution.report.tables import BEST_STORED, run_rows, target_rows
-from evolution.statistics.comparisons import holm
-from evolution.statistics.samples import rank_correlation
+from evolution.report.sections.comparisons import (
+    compared,
+    comparisons,
+    comparisons_of,
+)
+from evolution.report.sections.cost_of_targets import target_rows
+from evolution.report.sections.held_out_fitness import held_out_fitness_section
+from evolution.report.sections.success import FOLLOWS, MATCHES, outcomes
+from evolution.report.sections.what_stored_fitness_promised import (
+    WITH_NOISE,
+    what_stored_fitness_promised_section,
+)
+from evolution.report.summary_json import summary_fields, summary_text
+from evolution.statistics.estimates import rank_correlation
+from evolution.statistics.significance import holm, stars
 from evolution.study.config import seeds_text
 from evolution.study.data import load_study
 from tests.processes import PATIENCE
@@ -61,7 +72,7 @@ def rows_of(text):
 @pytest.fixture
 def bare(monkeypatch):
     """No figures: they take their time and have tests of their own."""
-    monkeypatch.setattr(module, "figures", lambda data: iter(()))
+    monkeypatch.setattr("evolution.report.figures.drawn_figures", lambda data: iter(()))
 
 
 @pytest.fixture(scope="module", params=N_OF, ids=lambda n: f"{n} seeds")
@@ -82,7 +93,7 @@ def written(tmp_path_factory):
     place = tmp_path_factory.mktemp("w")
     runs = {"de-best": [1, 2, 3], "de-rand": [1, 2, 3], "ga": [1, 2]}
     path = write_study(place / "study", runs)
-    assert report([str(path), "--output", str(place / "out"), "--ioh"]) == 0
+    assert report_study([str(path), "--output", str(place / "out"), "--ioh"]) == 0
     return place
 
 
@@ -123,8 +134,8 @@ def test_a_run_that_says_less_has_empty_cells(tmp_path):
     for column in ("epuck worst", "epuck following", "epuck mean_low", "control_steps"):
         assert row[column] == ""
     # of a criterion that not every run can meet or fail nothing is said
-    assert {row.criterion for row in success_rows(data)} == {MATCHES}
-    json.loads(summary_text(summary(data, "out", False)))
+    assert {each.criterion for each in outcomes(data)} == {MATCHES}
+    json.loads(summary_text(summary_fields(data, "out", False)))
 
 
 def test_pairs_by_hand(study):
@@ -159,7 +170,7 @@ def test_pairs_by_hand(study):
 
 def test_disturbed_champions_are_shown_with_their_disturbances(tmp_path):
     path = write_study(tmp_path / "study", seeds(2))
-    assert "disturbances" not in to_markdown(held_out_fitness(load_study(path)))
+    assert "disturbances" not in to_markdown(held_out_fitness_section(load_study(path)))
     for seed in (1, 2):
         champion = path / "ga" / f"seed-{seed}" / "champion.json"
         fields = json.loads(champion.read_text())
@@ -167,41 +178,40 @@ def test_disturbed_champions_are_shown_with_their_disturbances(tmp_path):
         disturbed = {robot: test | {"mean": 40.0 + seed} for robot in ROBOTS}
         fields["scores"]["held_out_as_evolved"] = disturbed
         champion.write_text(json.dumps(fields))
-    text = to_markdown(held_out_fitness(load_study(path)))
+    text = to_markdown(held_out_fitness_section(load_study(path)))
     assert "with the disturbances that they evolved with" in text
     assert "| GA | 2 | 41.5 (41.0, 42.0) |" in text
 
 
 def test_no_stars_below_ten_runs(study):
     n = len(study.runs["ga"])
-    for row in pair_rows(study):
-        assert bool(row.stars) == (n >= 10 and row.p_holm < 0.05)
-        text = compared(row, "A", "B")
+    for row in rows_of(tables(study)["pairwise.csv"]):
+        assert row["stars"] == stars(float(row["p_holm"]), n)
+    pairs = [pair for each in comparisons(study).values() for pair in each]
+    for pair in pairs:
+        text = compared(pair, "A", "B")
+        assert pair.decided == (n >= 10 and pair.p_holm < 0.05)
         assert "significant" not in text
         assert ("no verdict" in text) == (n < 10)
-    assert any(row.stars for row in pair_rows(study)) == (n >= 10)
+    assert any(pair.decided for pair in pairs) == (n >= 10)
 
 
 def test_words_name_the_better_one(large):
-    row = next(r for r in pair_rows(large) if r.measure == "held-out epuck")
-    assert (row.a, row.b) == ("de-best", "de-rand")
-    text = compared(row, "A", "B")
+    pair, *_ = comparisons(large)["held-out epuck"]
+    assert (pair.a, pair.b) == ("de-best", "de-rand")
+    text = compared(pair, "A", "B")
     assert text.startswith("A beats B in 100% of the pairs of runs: medians ")
     # told from the other side, it is the same sentence
-    mirrored = replace(
-        row,
-        a=row.b,
-        b=row.a,
-        median_a=row.median_b,
-        median_b=row.median_a,
-        a12=1 - row.a12,
-        a12_low=1 - row.a12_high,
-        a12_high=1 - row.a12_low,
-        median_difference=-row.median_difference,
-        median_difference_low=-row.median_difference_high,
-        median_difference_high=-row.median_difference_low,
-    )
-    assert compared(mirrored, "B", "A") == text
+    assert pair.turned().of_a is pair.of_b
+    assert compared(pair.turned(), "B", "A") == text
+    # and the numbers are those of the test the other way round
+    samples = {"de-rand": pair.of_b, "de-best": pair.of_a}
+    (other,) = comparisons_of(samples, lambda a, b: True)
+    assert (other.a, other.b) == (pair.turned().a, pair.turned().b)
+    assert other.a12.value == pytest.approx(pair.turned().a12.value)
+    assert other.a12.high == pytest.approx(pair.turned().a12.high)
+    assert other.shift.value == pair.turned().shift.value
+    assert other.shift.high == pytest.approx(pair.turned().shift.high, abs=5)
 
 
 def test_equal_samples_are_no_error(tmp_path):
@@ -212,10 +222,15 @@ def test_equal_samples_are_no_error(tmp_path):
             test["mean"] = 100.0
         champion.write_text(json.dumps(fields))
     data = load_study(path)
-    rows = [row for row in pair_rows(data) if row.measure != BEST_STORED]
-    assert {(row.p, row.p_holm, row.a12, row.u) for row in rows} == {(1, 1, 0.5, 4.5)}
+    rows = rows_of(tables(data)["pairwise.csv"])
+    found = {
+        tuple(float(row[column]) for column in ("p", "p_holm", "a12", "u"))
+        for row in rows
+        if row["measure"] != BEST_STORED
+    }
+    assert found == {(1, 1, 0.5, 4.5)}
     assert rank_correlation(np.full(5, 1.0), np.arange(5.0)) is None
-    json.loads(summary_text(summary(data, "out", False)))
+    json.loads(summary_text(summary_fields(data, "out", False)))
 
 
 def test_successes_by_hand(study):
@@ -246,8 +261,8 @@ def test_successes_by_hand(study):
 
 def test_without_a_yardstick_nothing_is_measured_by_it(tmp_path, bare):
     path = write_study(tmp_path / "study", seeds(2), yardstick=False)
-    assert {row.criterion for row in success_rows(load_study(path))} == {FOLLOWS}
-    assert report([str(path)]) == 0
+    assert {each.criterion for each in outcomes(load_study(path))} == {FOLLOWS}
+    assert report_study([str(path)]) == 0
     text = (path / "report/report.md").read_text()
     assert "not known, the hand-written wall follower was not tested" in text
     assert "- wall-follower: not tested" in text
@@ -281,7 +296,7 @@ def test_csv_has_exact_floats_and_quotes():
 
 
 def test_summary_is_strict_json_and_has_everything(study):
-    text = summary_text(summary(study, "out", True))
+    text = summary_text(summary_fields(study, "out", True))
     found = json.loads(text, parse_constant=pytest.fail)
     best = found["experiments"]["de-best"]
     sample = study.held_out("de-best", "epuck")
@@ -367,24 +382,41 @@ def check_markdown(text):
     return tables
 
 
-def test_blocks_are_escaped():
-    nasty = '<b> a|b *c* `d` [e](f) & "g" _h_ epuck_planar'
+NASTY = (
+    '<b> a|b *c* `d` [e](f) & "g" _h_ epuck_planar',
+    "__a__ _b c_d_ &amp; &#35; ~~e~~ ![f](g) <mailto:a@b> \\* \\",
+    "[a]: /b",
+    *("- a", "+ a", "1. a", "23) a", "# a #", "> a", "***", "___", "```", "    a"),
+)
+
+
+@pytest.mark.parametrize("nasty", NASTY)
+def test_text_stands_for_itself(nasty):
+    code = [nasty, "a < b && c", "``` x", "*d*"]
     blocks = [
         Heading(nasty, 1),
         Paragraph(nasty),
-        Listing([nasty, "- x"]),
-        Code(["a < b && c"]),
+        Listing([nasty, "x"]),
+        Code(code),
         Table(("x", nasty), [("1", nasty)]),
         Picture("p", nasty, b"<svg/>"),
     ]
     page = to_html(nasty, blocks)
-    assert check_html(page).count(nasty) == 7
+    words = " ".join(nasty.split())
+    plain = " ".join(" ".join(code).split())
+    style = " ".join(STYLE.split())
+    texts = (words, style, words, words, words, "x", plain, "x", *[words, "1"], words)
+    assert check_html(page) == " ".join([*texts, words])
     text = to_markdown(blocks)
     assert len(check_markdown(text)) == 1
-    assert r"\<b> a\|b \*c\* \`d\` [e\](f) & " in text
-    assert r"\_h\_ epuck_planar" in text
-    assert "\n- \\- x" in text
-    plain = "1 [2, 3] p < 0.1 & so"
+    # in one piece it is the same document
+    whole = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
+    for part in re.findall(r"<(h1|ul|pre|table)>(.*?)</\1>", page, re.DOTALL):
+        assert "<{0}>{1}</{0}>".format(*part) in whole
+
+
+def test_numbers_stay_readable():
+    plain = "1 [2, 3] p < 0.1 & so, 3-5 runs of epuck_planar (#1)."
     assert to_markdown([Paragraph(plain)]) == f"{plain}\n"
 
 
@@ -428,7 +460,7 @@ def test_the_same_study_gives_the_same_bytes(written):
 
     before = content()
     argv = [str(written / "study"), "--output", str(written / "out"), "--ioh"]
-    assert report(argv) == 0
+    assert report_study(argv) == 0
     assert content() == before
     assert {p.name for p in before} >= {
         "report.md",
@@ -443,7 +475,7 @@ def test_the_same_study_gives_the_same_bytes(written):
 
 def test_one_seed_says_so(tmp_path, bare):
     path = write_study(tmp_path / "study", seeds(1))
-    assert report([str(path)]) == 0
+    assert report_study([str(path)]) == 0
     text = (path / "report/report.md").read_text()
     assert "Only one run of DE/best/1/bin, DE/rand/1/bin, GA" in text
     assert "too few runs for an interval" in text
@@ -454,14 +486,14 @@ def test_one_seed_says_so(tmp_path, bare):
 
 def test_one_experiment_has_nothing_to_compare(tmp_path, bare):
     path = write_study(tmp_path / "study", {"ga": [1, 2]})
-    assert report([str(path)]) == 0
+    assert report_study([str(path)]) == 0
     assert "nothing to compare" in (path / "report/report.md").read_text()
     assert rows_of((path / "report/pairwise.csv").read_text()) == []
 
 
 def test_an_experiment_without_runs_is_named(tmp_path, bare, capsys):
     path = write_study(tmp_path / "study", {"de-best": [1, 2], "ga": []})
-    assert report([str(path)]) == 0
+    assert report_study([str(path)]) == 0
     assert "missing: ga: no finished run" in capsys.readouterr().err
     assert "| GA | ga | - | 0 |" in (path / "report/report.md").read_text()
 
@@ -470,7 +502,7 @@ def test_a_corrupt_history_is_named_and_left_out(tmp_path, bare, capsys):
     path = write_study(tmp_path / "study", seeds(3))
     damaged = path / "ga/seed-2/history.csv"
     damaged.write_text(damaged.read_text()[:-40] + "what")
-    assert report([str(path)]) == 0
+    assert report_study([str(path)]) == 0
     assert "missing: ga seed 2:" in capsys.readouterr().err
     rows = rows_of((path / "report/runs.csv").read_text())
     assert [row["seed"] for row in rows if row["experiment"] == "ga"] == ["1", "3"]
@@ -483,9 +515,9 @@ def test_figures_that_cannot_be_drawn_do_not_stop_the_report(tmp_path, monkeypat
         yield from ()
         raise UserError("no such arena")
 
-    monkeypatch.setattr(module, "figures", fail)
+    monkeypatch.setattr("evolution.report.figures.drawn_figures", fail)
     path = write_study(tmp_path / "study", seeds(2))
-    assert report([str(path)]) == 0
+    assert report_study([str(path)]) == 0
     text = (path / "report/report.md").read_text()
     note = "- not all figures could be drawn: no such arena"
     assert text.index(note) < text.index("## What was run")
@@ -519,12 +551,12 @@ def test_target_and_run_rows_follow_the_study_order(large):
 def test_luck_with_noise_is_held_against_starts_with_noise(tmp_path):
     path = write_study(tmp_path / "study", {"de-best": [1, 2, 3], "ga": [1, 2, 3]})
     data = load_study(path)
-    assert WITH_NOISE not in to_markdown(luck(data))
+    assert WITH_NOISE not in to_markdown(what_stored_fitness_promised_section(data))
     noisy = data.configs["ga"].model_copy(update={"noise": "calibrated"})
     data = replace(data, configs={**data.configs, "ga": noisy})
 
     def row():
-        text = to_markdown(luck(data))
+        text = to_markdown(what_stored_fitness_promised_section(data))
         assert WITH_NOISE in text
         (found,) = (line for line in text.splitlines() if line.startswith("| GA |"))
         return [cell.strip() for cell in found.strip("|").split("|")]
@@ -532,9 +564,9 @@ def test_luck_with_noise_is_held_against_starts_with_noise(tmp_path):
     # tested on ideal robots only: stored fitness is another quantity
     _, _, _, *cells = row()
     assert cells == ["-"] * 6
-    text = to_markdown(luck(data))
+    text = to_markdown(what_stored_fitness_promised_section(data))
     assert re.search(r"\| DE/best/1/bin \| 3 \| \d[^|]*\| \d[^|]*\| -?\d", text)
-    experiment = summary(data, "out", False)["experiments"]["ga"]
+    experiment = summary_fields(data, "out", False)["experiments"]["ga"]
     assert experiment["held_out"]["epuck"]["share_of_stored"] is None
     assert experiment["most_believed"] == {"stored": None, "held_out": None}
     runs = []
@@ -562,7 +594,8 @@ def test_experiments_of_other_budgets_are_not_compared(tmp_path):
     assert (
         "comparisons with de-best: evaluations times trials of de-rand are others"
     ) in data.missing
-    assert {(row.a, row.b) for row in pair_rows(data)} == {("de-best", "ga")}
+    pairs = [pair for each in comparisons(data).values() for pair in each]
+    assert {(pair.a, pair.b) for pair in pairs} == {("de-best", "ga")}
     # a champion's fitness on fresh starts is still held against the follower's
     assert data.yardstick
 
@@ -580,11 +613,11 @@ def test_experiments_of_other_settings_are_not_compared(tmp_path):
     assert (
         "comparisons with de-best: arena, task or start clearance of de-rand are others"
     ) in data.missing
-    pairs = pair_rows(data)
-    assert {(row.a, row.b, row.family) for row in pairs} == {("de-best", "ga", 1)}
+    pairs = [pair for each in comparisons(data).values() for pair in each]
+    assert {(pair.a, pair.b, pair.family) for pair in pairs} == {("de-best", "ga", 1)}
     # the follower drives in the setting of one of them
     assert not data.yardstick
-    successes = success_rows(data)
-    assert {row.criterion for row in successes} == {FOLLOWS}
-    others = {(row.experiment, row.other) for row in successes if row.other}
+    found = outcomes(data)
+    assert {each.criterion for each in found} == {FOLLOWS}
+    others = {(pair.a, pair.b) for each in found for pair in each.pairs}
     assert others == {("de-best", "ga")}

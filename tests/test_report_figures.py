@@ -18,24 +18,27 @@ from epuck_mj.policies.network import Network
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.trials.behaviour_classes import CLASSES
 from evolution.judging.scores import HeldOut, Scores
-from evolution.pages.files import save
+from evolution.pages.figure_files import write_figure
 from evolution.pages.style import LOOKS, looks
 from evolution.pages.words import label
-from evolution.report.figures import FIGURES, figures
-from evolution.report.figures.behaviour import (
-    CLASS_LOOKS,
-    behaviour,
-    median_run,
-    trajectories,
+from evolution.report.figures import STUDY_FIGURES, drawn_figures
+from evolution.report.figures.behaviour_bars import CLASS_LOOKS, behaviour_figure
+from evolution.report.figures.champions import (
+    held_out_figure,
+    rungs_figure,
+    stored_and_held_out_figure,
 )
-from evolution.report.figures.champions import held_out, rungs, stored_and_held_out
 from evolution.report.figures.curves import (
     N_POINTS,
     common_grid,
-    fitness,
-    fitness_all,
+    growth_figure,
+    growths_figure,
     on_grid,
-    targets,
+    targets_figure,
+)
+from evolution.report.figures.trajectories import (
+    median_run,
+    trajectories_figure,
 )
 from evolution.report.samples import TARGET_SHARES
 from evolution.settings.config_files import find_config, load_config
@@ -148,7 +151,7 @@ def test_a_common_grid_has_few_points_where_all_runs_have_begun():
 
 @pytest.mark.parametrize("name", ["de-best", "ga", "my own"])
 def test_fitness_shows_medians_bands_and_every_run(data, name):
-    figure, caption = fitness(data, name)
+    figure, caption = growth_figure(data, name)
     (axes,) = figure.axes
     runs, n = data.runs[name], N_RUNS[name]
     grid = common_grid(runs)
@@ -179,11 +182,11 @@ def test_fitness_shows_medians_bands_and_every_run(data, name):
 
 def test_no_curve_of_an_experiment_without_runs(data):
     with pytest.raises(ValueError, match="cma-es"):
-        fitness(data, "cma-es")
+        growth_figure(data, "cma-es")
 
 
 def test_fitness_all_shows_the_best_so_far_and_the_yardstick(data):
-    figure, caption = fitness_all(data)
+    figure, caption = growths_figure(data)
     (axes,) = figure.axes
     *curves, reference = axes.lines
     for line, name in zip(curves, ["de-best", "ga", "my own"], strict=True):
@@ -205,7 +208,7 @@ def test_fitness_all_shows_the_best_so_far_and_the_yardstick(data):
 
 def test_targets_shows_the_share_of_run_and_target_pairs_by_then(data):
     assert np.array(TARGET_SHARES) * 300 == pytest.approx(np.arange(50, 226, 25))
-    figure, caption = targets(data)
+    figure, caption = targets_figure(data)
     (axes,) = figure.axes
     for line, name in zip(axes.lines, ["de-best", "ga", "my own"], strict=True):
         runs = data.runs[name]
@@ -226,7 +229,7 @@ def test_targets_shows_the_share_of_run_and_target_pairs_by_then(data):
 
 
 def test_stored_and_held_out_shows_every_run_in_order_of_stored_fitness(data):
-    figure, caption = stored_and_held_out(data)
+    figure, caption = stored_and_held_out_figure(data)
     assert len(figure.axes) == 3
     for axes, name in zip(figure.axes, ["de-best", "ga", "my own"], strict=True):
         order = np.argsort(data.stored(name))
@@ -243,7 +246,7 @@ def test_stored_and_held_out_shows_every_run_in_order_of_stored_fitness(data):
 
 
 def test_held_out_shows_every_run_the_quartiles_and_the_yardstick(data):
-    figure, caption = held_out(data)
+    figure, caption = held_out_figure(data)
     for axes, robot in zip(figure.axes, ROBOTS, strict=True):
         samples = [data.held_out(name, robot) for name in ["de-best", "ga", "my own"]]
         for row, (found, sample) in enumerate(zip(dots(axes), samples, strict=True)):
@@ -265,7 +268,7 @@ def test_held_out_shows_every_run_the_quartiles_and_the_yardstick(data):
 
 
 def test_rungs_shows_the_last_robot_against_the_first(data):
-    figure, _ = drawn(rungs(data))
+    figure, _ = drawn(rungs_figure(data))
     (axes,) = figure.axes
     for found, name in zip(dots(axes), ["de-best", "ga", "my own"], strict=True):
         expected = [data.held_out(name, robot) for robot in ROBOTS]
@@ -285,7 +288,7 @@ def test_behaviour_shows_mean_shares(data):
     }
     other = replace(run, scores=Scores(stored=1.0, held_out=tests))
     runs = {**data.runs, "ga": (run, other)}
-    figure, caption = drawn(behaviour(replace(data, runs=runs)))
+    figure, caption = drawn(behaviour_figure(replace(data, runs=runs)))
     first, second = (
         [bar.get_width() for bar in axes.patches if isinstance(bar, Rectangle)]
         for axes in figure.axes
@@ -299,7 +302,7 @@ def test_behaviour_shows_mean_shares(data):
 
 def test_behaviour_of_the_yardstick_is_the_last_row(data):
     yardstick = dict.fromkeys(ROBOTS, a_test(1.0, SHARES))
-    figure, _ = drawn(behaviour(replace(data, yardstick=yardstick)))
+    figure, _ = drawn(behaviour_figure(replace(data, yardstick=yardstick)))
     assert figure.axes[0].get_yticklabels()[-1].get_text() == "hand-written"
 
 
@@ -316,7 +319,7 @@ def test_median_run_is_the_lower_of_two(data):
 
 
 def test_trajectories_has_a_column_per_experiment(data, tmp_path):
-    figure, caption = trajectories(data)
+    figure, caption = trajectories_figure(data)
     *panels, _ = figure.axes
     seeds = {name: median_run(data, name).seed for name in ("de-best", "ga")}
     assert [axes.get_title().split("\n")[0] for axes in panels] == 2 * [
@@ -328,12 +331,12 @@ def test_trajectories_has_a_column_per_experiment(data, tmp_path):
     np.testing.assert_array_equal(starts[0], starts[1])
     assert (starts[0] != starts[2]).all()
     assert f"seed {seeds['ga']} of GA (n = 2)" in caption
-    save(figure, tmp_path, "trajectories")
+    write_figure(figure, tmp_path, "trajectories")
     assert (tmp_path / "trajectories.svg").stat().st_size < 300_000
 
 
 def test_trajectories_of_other_experiments_if_none_is_the_papers():
-    figure, _ = trajectories(a_study({"my own": 1}))
+    figure, _ = trajectories_figure(a_study({"my own": 1}))
     assert [axes.get_title()[:6] for axes in figure.axes[:-1]] == ["my own"] * 2
 
 
@@ -353,13 +356,15 @@ def test_looks_are_fixed_and_all_different():
 @pytest.mark.parametrize("n_runs", [N_RUNS, {"my own": 1}, {"ga": 0, "de-best": 2}])
 def test_every_study_has_its_figures(n_runs, robots, yardstick, monkeypatch):
     monkeypatch.setattr(
-        "evolution.report.figures.FIGURES",
-        {name: draw for name, draw in FIGURES.items() if name != "trajectories"},
+        "evolution.report.figures.STUDY_FIGURES",
+        {name: draw for name, draw in STUDY_FIGURES.items() if name != "trajectories"},
     )
-    found = {name: caption for name, _, caption in figures(a_study(n_runs, robots))}
+    found = {
+        name: caption for name, _, caption in drawn_figures(a_study(n_runs, robots))
+    }
     left_out = {"trajectories"} | ({"rungs"} if len(robots) < 2 else set())
     own = [f"fitness-{name}" for name, n in n_runs.items() if n]
-    assert list(found) == own + [name for name in FIGURES if name not in left_out]
+    assert list(found) == own + [name for name in STUDY_FIGURES if name not in left_out]
     assert all(re.search(r"n = \d", caption) for caption in found.values())
 
 
@@ -367,15 +372,20 @@ def test_no_behaviour_in_older_runs(data):
     older = Scores(stored=1.0, held_out=dict.fromkeys(ROBOTS, a_test(1.0, {})))
     runs = {"ga": tuple(replace(run, scores=older) for run in data.runs["ga"])}
     assert (
-        behaviour(replace(data, configs={"ga": data.configs["ga"]}, runs=runs)) is None
+        behaviour_figure(replace(data, configs={"ga": data.configs["ga"]}, runs=runs))
+        is None
     )
 
 
 def test_one_generation_is_enough(tmp_path):
     run = a_run("ga", 1, evaluations=100)
     data = replace(a_study({"ga": 1}), runs={"ga": (run,)})
-    for figure, _ in (fitness(data, "ga"), fitness_all(data), targets(data)):
-        save(figure, tmp_path, "short")
+    for figure, _ in (
+        growth_figure(data, "ga"),
+        growths_figure(data),
+        targets_figure(data),
+    ):
+        write_figure(figure, tmp_path, "short")
 
 
 def test_files_are_repeatable_small_and_sound(tmp_path):
@@ -384,13 +394,13 @@ def test_files_are_repeatable_small_and_sound(tmp_path):
     for folder in folders:
         folder.mkdir()
         data = a_study(n_runs)
-        save(fitness(data, "de-best")[0], folder, "fitness")
-        for draw in (held_out, behaviour):
-            save(drawn(draw(data))[0], folder, draw.__name__)
+        write_figure(growth_figure(data, "de-best")[0], folder, "fitness")
+        for draw in (held_out_figure, behaviour_figure):
+            write_figure(drawn(draw(data))[0], folder, draw.__name__)
     names = sorted(path.name for path in folders[0].iterdir())
     assert names == [
         f"{name}.{form}"
-        for name in ("behaviour", "fitness", "held_out")
+        for name in ("behaviour_figure", "fitness", "held_out_figure")
         for form in ("pdf", "png", "svg")
     ]
     for name in names:
@@ -405,4 +415,4 @@ def test_files_are_repeatable_small_and_sound(tmp_path):
 
 def test_a_folder_that_is_not_there_is_the_users_error(data, tmp_path):
     with pytest.raises(UserError, match=r"cannot write .*/a\.svg'"):
-        save(fitness(data, "ga")[0], tmp_path / "nowhere", "a")
+        write_figure(growth_figure(data, "ga")[0], tmp_path / "nowhere", "a")

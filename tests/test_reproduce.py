@@ -6,7 +6,7 @@ import pytest
 
 from epuck_mj.errors import UserError
 from evolution.reproduce import __main__ as module
-from evolution.reproduce.__main__ import reproduce
+from evolution.reproduce.__main__ import reproduce_paper
 from evolution.reproduce.verdicts import OTHER_STUDY
 
 TINY = """
@@ -33,7 +33,7 @@ def here(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_one_command_runs_reports_and_judges_and_goes_on(here, monkeypatch, capfd):
-    assert reproduce(["--quick", "--output", "out"]) == 0
+    assert reproduce_paper(["--quick", "--output", "out"]) == 0
     first = (here / "out" / "REPRODUCTION.md").read_text()
     assert "python -m evolution.reproduce --quick --output out" in first
     # it is another study than the paper's, and says so
@@ -46,8 +46,8 @@ def test_one_command_runs_reports_and_judges_and_goes_on(here, monkeypatch, capf
     assert len(runs) == 4
     # again: what is done is not done once more
     before = [path.stat().st_mtime_ns for path in runs]
-    monkeypatch.setattr("evolution.report.__main__.figures", lambda data: iter(()))
-    assert reproduce(["--quick", "--output", "out"]) == 0
+    monkeypatch.setattr("evolution.report.figures.drawn_figures", lambda data: iter(()))
+    assert reproduce_paper(["--quick", "--output", "out"]) == 0
     assert [path.stat().st_mtime_ns for path in runs] == before
     assert (here / "out" / "REPRODUCTION.md").read_text() == first
     # a run that cannot be done, somebody's own files are there, stops nothing else
@@ -55,7 +55,7 @@ def test_one_command_runs_reports_and_judges_and_goes_on(here, monkeypatch, capf
     for path in thesis.parent.iterdir():
         path.unlink()
     thesis.write_text("years of work")
-    assert reproduce(["--quick", "--output", "out"]) == 1
+    assert reproduce_paper(["--quick", "--output", "out"]) == 1
     assert "ga seed 2 failed" in capfd.readouterr().err
     text = (here / "out" / "REPRODUCTION.md").read_text()
     assert "- ga seed 2: not finished" in text
@@ -74,5 +74,5 @@ def test_one_command_runs_reports_and_judges_and_goes_on(here, monkeypatch, capf
 )
 def test_bad_input(here, arguments, message):
     with pytest.raises(UserError, match=message) as caught:
-        reproduce(arguments)
+        reproduce_paper(arguments)
     assert "\n" not in str(caught.value)

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.publish import shipped, with_tables
 from epuck_mj.scene.model_files import MODELS
-from evolution.gap.document import document, summary
+from evolution.gap.gap_document import gap_document, gap_summary
 from evolution.gap.groups import experiments, peers
 from evolution.gap.transfer import Transfer
 from evolution.named_policies import named_policies
 from evolution.pages.blocks import to_markdown
+from evolution.reproduce.publish import shipped, with_tables
 from evolution.study.config import StudyConfig, find_study
 from evolution.study.data import load_study
 from evolution.verify import verify
@@ -106,7 +106,9 @@ def test_the_gap_s_documents_say_what_was_measured(monkeypatch):
     policies = [policy for name in names for policy in named_policies(name)]
     groups, of_one_speed = experiments(policies), peers(policies)
     latency = np.array([world["latency"] for world in record["worlds"]])
-    blocks = document(names, transfers, groups, of_one_speed, record["starts"], latency)
+    blocks = gap_document(
+        names, transfers, groups, of_one_speed, record["starts"], latency
+    )
     assert (RESULTS / "gap" / "gap.md").read_text() == to_markdown(blocks)
-    table = to_markdown([summary(transfers, groups, of_one_speed)])
+    table = to_markdown([gap_summary(transfers, groups, of_one_speed)])
     assert (RESULTS / "gap" / "summary.md").read_text() == table

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from epuck_mj.errors import UserError
-from evolution.report.tables import provenance
+from evolution.report.sections.how_to_get_every_number_again import origins
 from evolution.study.data import load_study, read_history
 from tests.study_on_disk import write_study
 
@@ -71,7 +71,7 @@ def test_a_damaged_yardstick_is_missing_and_the_runs_are_there(path, text):
 def test_edited_provenance_is_left_out(path, change):
     file = path / "ga" / "seed-1" / "provenance.json"
     edit(file, lambda fields: fields.update(change))
-    assert provenance(load_study(path))["git"]
+    assert origins(load_study(path))["git"]
 
 
 def test_seeds_that_were_asked_for_are_missed(path):

@@ -14,22 +14,21 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import check_threads, main, parse
 from epuck_mj.host.files import check_writable, write_text, writing
 from epuck_mj.scene.model_files import PLANAR_ROBOT, WHEELED_ROBOT
-from evolution.gap.document import document, summary
-from evolution.gap.figure import kept_figure
+from evolution.gap.gap_document import gap_document, gap_summary
 from evolution.gap.groups import experiments, peers
-from evolution.gap.measure import Outcome, abroad, ideal
+from evolution.gap.outcomes import Outcome, abroad, ideal
 from evolution.gap.transfer import Transfer, verdict
 from evolution.gap.worlds import World, worlds
 from evolution.named_policies import NamedPolicy, named_policies
 from evolution.pages.blocks import to_markdown
-from evolution.pages.files import csv_text, save
+from evolution.pages.csv_text import csv_text
 
-MODULE = "evolution.gap"
-WORLDS_MAX, STARTS_MAX = 1000, 1000
+NUMBER_MAX = 1000
+"""Most worlds, and most starts in each."""
 
 
 @dataclass(frozen=True)
-class Options:
+class GapOptions:
     """Drive champions in worlds that differ from the one they evolved in.
 
     Attributes:
@@ -49,19 +48,16 @@ class Options:
     threads: int = 0
 
 
-def gap(argv: Sequence[str]) -> int:
+def measure_gap(argv: Sequence[str]) -> int:
     """Run the command line; its exit status.
 
     Raises:
         UserError: for anything the user can put right.
     """
-    options = parse(Options, f"python -m {MODULE}", argv)
-    for name, value, most in (
-        ("worlds", options.worlds, WORLDS_MAX),
-        ("starts", options.starts, STARTS_MAX),
-    ):
-        if not 2 <= value <= most:
-            raise UserError(f"expected 2 to {most} {name}, got {value}")
+    options = parse(GapOptions, "python -m evolution.gap", argv)
+    for name, value in (("worlds", options.worlds), ("starts", options.starts)):
+        if not 2 <= value <= NUMBER_MAX:
+            raise UserError(f"expected 2 to {NUMBER_MAX} {name}, got {value}")
     check_threads(options.threads)
     if not options.paths:
         raise UserError(
@@ -89,7 +85,7 @@ def _measured(
     policies: Sequence[NamedPolicy],
     places: Sequence[World],
     robot: str,
-    options: Options,
+    options: GapOptions,
 ) -> Measured:
     n, threads = options.starts, options.threads
     home = ideal(policies, robot, n, threads)
@@ -113,8 +109,11 @@ def _write(
     policies: Sequence[NamedPolicy],
     places: Sequence[World],
     measured: dict[str, Measured],
-    options: Options,
+    options: GapOptions,
 ) -> None:
+    from evolution.gap.figure import kept_figure
+    from evolution.pages.figure_files import write_figure
+
     transfers = {robot: Transfer.of(*outcomes) for robot, outcomes in measured.items()}
     groups = experiments(policies)
     record = {
@@ -138,11 +137,11 @@ def _write(
         names = [policy.name for policy in policies]
         latency = np.array([place.latency for place in places])
         alike = peers(policies)
-        blocks = document(names, transfers, groups, alike, options.starts, latency)
+        blocks = gap_document(names, transfers, groups, alike, options.starts, latency)
         write_text(folder / "gap.md", to_markdown(blocks))
-        table = to_markdown([summary(transfers, groups, alike)])
+        table = to_markdown([gap_summary(transfers, groups, alike)])
         write_text(folder / "summary.md", table)
-    save(kept_figure(transfers, groups), folder, "gap")
+    write_figure(kept_figure(transfers, groups), folder, "gap")
 
 
 def _rows(
@@ -168,4 +167,4 @@ def _rows(
 
 
 if __name__ == "__main__":
-    main(gap)
+    main(measure_gap)

@@ -11,10 +11,10 @@ from evolution.gap.transfer import SHARE_KEPT, Transfer
 from evolution.pages.style import PAGE, PRINT
 from evolution.pages.words import robot_name
 
-LINES = ("-", (0, (7, 2)), (0, (2, 1.5)), (0, (7, 1.5, 1.2, 1.5)))
+DASHES = ("-", (0, (7, 2)), (0, (2, 1.5)), (0, (7, 1.5, 1.2, 1.5)))
 
 SHARE_END = 1.2
-"""Of the axis; noise helps some."""
+"""End of the axis of shares; noise helps some."""
 
 
 def kept_figure(
@@ -39,7 +39,7 @@ def kept_figure(
                     where="pre",
                     label=f"{group} (n = {len(members)})",
                     color=fraction(TRIALS[i % len(TRIALS)]),
-                    linestyle=LINES[i % len(LINES)],
+                    linestyle=DASHES[i % len(DASHES)],
                     lw=1.4,
                 )
             axes.axvline(SHARE_KEPT, color="0.4", lw=0.8, ls=":")

@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
-from evolution.gap.measure import Outcome
-from evolution.statistics.samples import (
+from evolution.gap.outcomes import Outcome
+from evolution.statistics.estimates import (
     Interval,
     mean_interval,
     rank_correlation,
@@ -18,7 +17,7 @@ SHARE_KEPT = 0.8
 """Least share of its fitness that a policy keeps in a world it masters."""
 
 COLLISIONS_MAX = 1.0
-"""Collisions per minute from which on it has not mastered that world."""
+"""Collisions per minute from which on a policy has not mastered a world."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +45,7 @@ class Transfer:
         ideal: Sequence[Sequence[Outcome]],
         abroad: Sequence[Sequence[Outcome]],
     ) -> "Transfer":
-        """From what was measured.
+        """The transfer that was measured.
 
         Args:
             home: an outcome per policy.
@@ -74,7 +73,7 @@ class Transfer:
 
     @property
     def mastered_against_home(self) -> np.ndarray:
-        """The same if what counts is the share of its fitness at home, `(w, p)`."""
+        """Worlds mastered if the share of fitness at home is what counts, `(w, p)`."""
         return self._mastered(_share(self.fitness, self.home))
 
     def _mastered(self, share: np.ndarray) -> np.ndarray:
@@ -116,7 +115,7 @@ def verdict(transfer: Transfer, policy: int) -> Verdict:
 def rank_correlations(
     transfer: Transfer, members: Sequence[int]
 ) -> dict[str, float] | None:
-    """Spearman's, of the ranks of some policies; None if they are too few.
+    """Spearman's correlations of the ranks of policies; None if they are too few.
 
     `home`: between home and a world, the mean over the worlds. `worlds`: between two
     worlds, the mean over all pairs. Worlds where all fare alike say nothing.
@@ -126,6 +125,8 @@ def rank_correlations(
     own = [each for each in found if each is not None]
     if len(own) < 2:
         return None
+    from scipy import stats
+
     told = fitness[np.ptp(fitness, axis=1) > 0]
     between = np.corrcoef(stats.rankdata(told, axis=1))
     return {
@@ -137,7 +138,7 @@ def rank_correlations(
 def between_robots(
     one: Transfer, other: Transfer, members: Sequence[int]
 ) -> float | None:
-    """Spearman's, of the policies' mean fitness over the worlds on two robots."""
+    """Spearman's correlation of policies' mean fitness in the worlds on two robots."""
     mean, others = (each.fitness.mean(axis=0)[members] for each in (one, other))
     return rank_correlation(mean, others)
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
 
 from epuck_mj.constants import (
     N_PROXIMITY,
@@ -17,7 +16,7 @@ from epuck_mj.step.disturbances import Disturbances
 from evolution.settings.randomness import random_generator
 
 WORLD_SEED = 0
-"""Of the worlds: the same for every champion and every study."""
+"""Seed of the worlds, which are the same for every champion and every study."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,7 @@ class World:
 
 ARENAS = ("arena", "small_square", "rectangle", "l_shape", "octagon")
 
-RANGES: dict[str, tuple[float, float]] = {
+WORLD_RANGES: dict[str, tuple[float, float]] = {
     "period": (0.08, 0.12),
     # a logarithm: half as strong is as likely as twice as strong
     "curve": (np.log(1 / 1.5), np.log(1.5)),
@@ -79,13 +78,15 @@ LATENCY_MAX = disturbances.RANGES.latency[1]
 
 def worlds(n: int) -> list[World]:
     """The first worlds of a Latin hypercube of `n`: every range in `n` even parts."""
-    names = list(RANGES)
+    from scipy.stats import qmc
+
+    names, ranges = list(WORLD_RANGES), list(WORLD_RANGES.values())
     cube = qmc.LatinHypercube(len(names) + 2, rng=np.random.default_rng(WORLD_SEED))
     found = []
     for row in cube.random(n):
         values = {
             name: low + share * (high - low)
-            for (name, (low, high)), share in zip(RANGES.items(), row, strict=False)
+            for name, (low, high), share in zip(names, ranges, row, strict=False)
         }
         values["curve"] = float(np.exp(values["curve"]))
         arena, latency = row[-2] * len(ARENAS), row[-1] * (LATENCY_MAX + 1)
@@ -101,7 +102,7 @@ def met(world: World, index: int, n: int, steps: int) -> Disturbances:
         world: the pseudo-reality.
         index: its number, by which its noise is drawn.
         n: number of trials.
-        steps: of a trial.
+        steps: control steps of a trial.
     """
     rng = random_generator(WORLD_SEED, index)
     # one robot in all trials: only its noise is new

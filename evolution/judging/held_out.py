@@ -22,7 +22,7 @@ from evolution.judging.evaluation import CAPACITY
 from evolution.judging.scores import HeldOut
 from evolution.judging.starts import N_TEST, starts_for_test
 from evolution.settings.setting import Setting
-from evolution.statistics.samples import mean_interval, worst_share_mean
+from evolution.statistics.estimates import mean_interval, worst_share_mean
 
 INTERVAL_SEED = 0
 """Of the bootstrap's resamples, so that the same trials give the same interval."""

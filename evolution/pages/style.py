@@ -6,7 +6,6 @@ Figures have the size they are printed at, so that text keeps its size.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import cycle
-from types import MappingProxyType
 from typing import Any
 
 from matplotlib.artist import Artist
@@ -66,16 +65,14 @@ class Look:
     marker: str
 
 
-LOOKS: MappingProxyType[str, Look] = MappingProxyType(
-    {
-        "de-best": Look(fraction(colors.BLUE), "-", "o"),
-        "de-rand": Look(fraction(colors.VERMILION), (0, (7, 2)), "s"),
-        "ga": Look(fraction(colors.GREEN), (0, (7, 1.5, 1.2, 1.5)), "^"),
-        "cma-es": Look(fraction(colors.PURPLE), (0, (3, 1.2)), "D"),
-        "one-plus-one-es": Look(fraction(colors.ORANGE), (0, (4, 1, 1, 1, 1, 1)), "v"),
-        "random-search": Look(fraction(colors.GREY), (0, (1, 1)), ">"),
-    }
-)
+LOOKS: Mapping[str, Look] = {
+    "de-best": Look(fraction(colors.BLUE), "-", "o"),
+    "de-rand": Look(fraction(colors.VERMILION), (0, (7, 2)), "s"),
+    "ga": Look(fraction(colors.GREEN), (0, (7, 1.5, 1.2, 1.5)), "^"),
+    "cma-es": Look(fraction(colors.PURPLE), (0, (3, 1.2)), "D"),
+    "one-plus-one-es": Look(fraction(colors.ORANGE), (0, (4, 1, 1, 1, 1, 1)), "v"),
+    "random-search": Look(fraction(colors.GREY), (0, (1, 1)), ">"),
+}
 """Shipped experiments; any other takes a spare look."""
 
 # without yellow, which white paper swallows
@@ -87,9 +84,11 @@ SPARE_LINES = (
     ((0, (9, 2)), "*"),
 )
 
-YARDSTICK_LOOK: MappingProxyType[str, Any] = MappingProxyType(
-    {"color": "black", "linestyle": "--", "linewidth": 1}
-)
+YARDSTICK_LOOK: Mapping[str, Any] = {
+    "color": "black",
+    "linestyle": "--",
+    "linewidth": 1,
+}
 YARDSTICK_SHORT = "hand-written, held-out"
 
 
@@ -107,7 +106,7 @@ def looks(data: StudyData) -> dict[str, Look]:
     return found
 
 
-def counted(name: str, n: int) -> str:
+def with_count(name: str, n: int) -> str:
     """An experiment's name for readers with its number of runs."""
     return f"{label(name)} (n = {n})"
 
@@ -118,7 +117,7 @@ def counts(data: StudyData) -> str:
     sizes = {len(each) for each in runs.values()}
     if len(sizes) == 1:
         return f"n = {sizes.pop()} per experiment"
-    return "; ".join(counted(name, len(each)) for name, each in runs.items())
+    return "; ".join(with_count(name, len(each)) for name, each in runs.items())
 
 
 def count_evaluations(axes: Axes, last: float) -> None:

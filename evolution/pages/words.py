@@ -2,30 +2,29 @@
 
 import math
 import shlex
-from types import MappingProxyType
+from collections.abc import Mapping
 
 import numpy as np
 
-from evolution.statistics.samples import FEWEST_FOR_INTERVAL, quartiles
+from evolution.statistics.estimates import FEWEST_FOR_INTERVAL, Interval, quartiles
 
-LABELS: MappingProxyType[str, str] = MappingProxyType(
-    {
-        "de-best": "DE/best/1/bin",
-        "de-rand": "DE/rand/1/bin",
-        "ga": "GA",
-        "cma-es": "CMA-ES",
-        "one-plus-one-es": "(1+1)-ES",
-        "random-search": "random search",
-    }
-)
+LABELS: Mapping[str, str] = {
+    "de-best": "DE/best/1/bin",
+    "de-rand": "DE/rand/1/bin",
+    "ga": "GA",
+    "cma-es": "CMA-ES",
+    "one-plus-one-es": "(1+1)-ES",
+    "random-search": "random search",
+}
 """Names of shipped experiments; any other is called by its own."""
 
 PAPERS = ("de-best", "de-rand", "ga")
 """The experiments of the paper."""
 
-ROBOTS: MappingProxyType[str, str] = MappingProxyType(
-    {"epuck_planar": "planar robot", "epuck": "wheeled robot"}
-)
+ROBOT_NAMES: Mapping[str, str] = {
+    "epuck_planar": "planar robot",
+    "epuck": "wheeled robot",
+}
 
 YARDSTICK_LABEL = "hand-written wall follower"
 
@@ -40,11 +39,11 @@ def label(experiment: str) -> str:
 
 def robot_name(robot: str) -> str:
     """A robot's name for readers."""
-    return ROBOTS.get(robot, robot)
+    return ROBOT_NAMES.get(robot, robot)
 
 
 SPREAD = f"Median [quartiles] over runs (below {FEWEST_FOR_INTERVAL}: every run)"
-"""What `spread` writes."""
+"""Note beside a table of what `spread` writes."""
 
 
 def spread(sample: np.ndarray, scale: float = 1.0, form: str = "z.1f") -> str:
@@ -64,7 +63,7 @@ def _listed(sample: np.ndarray, form: str) -> str:
 
 
 def median_and_quartiles(sample: np.ndarray, unit: str = "") -> str:
-    """The same for a sentence."""
+    """Median and quartiles of `(n,)` for a sentence."""
     found = quartiles(sample)
     text = f"median {found.median:.1f}{unit}"
     if sample.size == 1:
@@ -74,8 +73,9 @@ def median_and_quartiles(sample: np.ndarray, unit: str = "") -> str:
     return f"{text} (quartiles {found.lower:.1f} and {found.upper:.1f})"
 
 
-def between(low: float, high: float, form: str = ".2f") -> str:
-    """An interval, or that there is none."""
+def between(interval: Interval, form: str = ".2f") -> str:
+    """The bounds of an interval, or that there are none."""
+    low, high = interval.low, interval.high
     if math.isnan(low) or math.isnan(high):
         return "(too few runs for an interval)"
     return f"[{low:{form}}, {high:{form}}]"
@@ -84,6 +84,11 @@ def between(low: float, high: float, form: str = ".2f") -> str:
 def percent(share: float | None) -> str:
     """A share in percent; None and nan are not known."""
     return NOTHING if share is None or math.isnan(share) else f"{share:.1%}"
+
+
+def percent_median(shares: np.ndarray) -> str:
+    """The median of shares `(n,)` in percent."""
+    return percent(float(np.median(shares)) if shares.size else None)
 
 
 def probability(p: float) -> str:
@@ -97,5 +102,5 @@ def evaluations(n: float | None) -> str:
 
 
 def command_line(module: str, *arguments: str) -> str:
-    """The line that runs a module of ours, the same wherever the report is made."""
+    """The line that runs a module of ours, whatever interpreter made the report."""
     return shlex.join(["python", "-m", module, *arguments])

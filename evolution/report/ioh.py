@@ -18,14 +18,14 @@ from evolution.study.data import RunData, StudyData
 FUNCTION_ID, FUNCTION = 1, "WallFollowing"
 
 VERSION = "0.3.22"
-"""Of `ioh`, whose format this is; readers tell formats apart by it."""
+"""Version of `ioh` whose format this is; readers tell formats apart by it."""
 
 HEADER = ("evaluations", "raw_y")
 
 LOWEST = 0.0
 """Fitness that every individual has at least: a trial's is a sum of none below 0."""
 
-README = """\
+NOTE = """\
 # Histories for IOHanalyzer
 
 One folder per experiment, one run per seed (`instance` is the seed), maximisation of
@@ -42,7 +42,7 @@ https://iohanalyzer.liacs.nl, or with the Python package `iohinspector`.
 """
 
 
-def export(data: StudyData, folder: Path) -> None:
+def export_histories(data: StudyData, folder: Path) -> None:
     """Write all runs, and a note on what the numbers are.
 
     The note is no .txt file: IOHanalyzer would take it for data.
@@ -51,7 +51,7 @@ def export(data: StudyData, folder: Path) -> None:
         OSError: if something cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / "README.md", README)
+    write_text(folder / "README.md", NOTE)
     for name, runs in data.with_runs.items():
         genes = data.configs[name].network.n_genes
         path = (

@@ -12,13 +12,11 @@ from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import command, main, parse
 from epuck_mj.step.fitness import STEP_FITNESS
-from evolution.report.__main__ import report
-from evolution.reproduce.document import reproduction
+from evolution.report.__main__ import report_study
 from evolution.reproduce.first_generation import first_generation
+from evolution.reproduce.reproduction import reproduction
 from evolution.study.__main__ import study
 from evolution.study.data import load_study
-
-MODULE = "evolution.reproduce"
 
 QUICK = (("quick", "1-3"),)
 FULL = (("paper", "1-30"), ("wheels", "1-3"))
@@ -26,7 +24,7 @@ FULL = (("paper", "1-30"), ("wheels", "1-3"))
 
 
 @dataclass(frozen=True)
-class Options:
+class ReproduceOptions:
     """Redo the paper's comparison, and say which of its claims hold.
 
     Writes studies, reports and REPRODUCTION.md; call it again to go on.
@@ -47,13 +45,13 @@ class Options:
     wheels: Path | None = None
 
 
-def reproduce(argv: Sequence[str]) -> int:
+def reproduce_paper(argv: Sequence[str]) -> int:
     """Run the command line; its exit status.
 
     Raises:
         UserError: for anything the user can put right.
     """
-    options = parse(Options, f"python -m {MODULE}", argv)
+    options = parse(ReproduceOptions, "python -m evolution.reproduce", argv)
     if [options.quick, options.full, options.study is not None].count(True) > 1:
         raise UserError("expected one of --quick, --full and --study")
     if options.wheels is not None:
@@ -78,7 +76,9 @@ def reproduce(argv: Sequence[str]) -> int:
             places.append(place)
     studies = [load_study(place) for place in filter(None, places)]
     for place in filter(None, places):
-        report([str(place), "--output", str(options.output / f"report-{place.name}")])
+        report_study(
+            [str(place), "--output", str(options.output / f"report-{place.name}")]
+        )
     main_study, *others = studies
     config = next(iter(main_study.configs.values()))
     try:
@@ -88,7 +88,9 @@ def reproduce(argv: Sequence[str]) -> int:
         print(f"missing: the first generation: {error}", file=sys.stderr)
         unevolved = []
     wheels = others[0] if others else None
-    text = reproduction(main_study, wheels, unevolved, command(MODULE, *argv))
+    text = reproduction(
+        main_study, wheels, unevolved, command("evolution.reproduce", *argv)
+    )
     path = options.output / "REPRODUCTION.md"
     with files.writing():
         options.output.mkdir(parents=True, exist_ok=True)
@@ -98,4 +100,4 @@ def reproduce(argv: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
-    main(reproduce)
+    main(reproduce_paper)

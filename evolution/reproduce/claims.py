@@ -8,9 +8,13 @@ import numpy as np
 
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.pages.words import PAPERS, label, median_and_quartiles
-from evolution.report.pairs import PairRow, numbers, pairs_of
+from evolution.report.measures import held_out_measure, measures
 from evolution.report.samples import FOLLOWING, known
-from evolution.report.tables import held_out_measure, measures
+from evolution.report.sections.comparisons import (
+    Comparison,
+    comparisons_of,
+    numbers,
+)
 from evolution.reproduce.verdicts import (
     HANGS_ON_READING,
     NOT_MEASURED,
@@ -20,7 +24,7 @@ from evolution.reproduce.verdicts import (
     of_most,
     of_order,
 )
-from evolution.settings.config import flat
+from evolution.settings.config import differences
 from evolution.study.config import StudyConfig, find_study
 from evolution.study.data import StudyData
 
@@ -86,7 +90,7 @@ def held_out_order(study: StudyData, robot: str) -> list[Claim]:
     """
     held_out = _samples(study, lambda name: study.held_out(name, robot))
     measure = held_out_measure(robot)
-    rows = pairs_of(measure, measures(study)[measure], study.alike)
+    rows = comparisons_of(measures(study)[measure], study.alike)
     found = _orders(rows, held_out, f"in held-out fitness on {robot}")
     return _of_the_paper(study, found)
 
@@ -98,11 +102,12 @@ def unlike(study: StudyData) -> list[str]:
     for name in PAPERS:
         if name not in study.configs:
             continue
-        theirs, ours = flat(shipped[name]), flat(study.configs[name])
+        found = differences(
+            {"shipped": shipped[name], "ours": study.configs[name]}, ("seed", "robot")
+        )
         differing = [
-            f"{key} {ours.get(key)} (shipped {theirs.get(key)})"
-            for key in dict.fromkeys([*theirs, *ours])
-            if key not in ("seed", "robot") and theirs.get(key) != ours.get(key)
+            f"{key} {values.get('ours')} (shipped {values.get('shipped')})"
+            for key, values in found.items()
         ]
         if differing:
             lines.append(f"{name}: {', '.join(differing)}")
@@ -147,14 +152,14 @@ def _of_the_paper(study: StudyData, found: Sequence[Claim]) -> list[Claim]:
     return [Claim(each.text, "-", each.n, OTHER_STUDY) for each in found]
 
 
-def _pairs(study: StudyData, samples: dict[str, np.ndarray]) -> list[PairRow]:
+def _pairs(study: StudyData, samples: dict[str, np.ndarray]) -> list[Comparison]:
     """All pairs of the paper's algorithms that have runs."""
     filled = {name: sample for name, sample in samples.items() if sample.size}
-    return pairs_of("", filled, study.alike)
+    return comparisons_of(filled, study.alike)
 
 
 def _orders(
-    rows: Sequence[PairRow], samples: dict[str, np.ndarray], where: str
+    rows: Sequence[Comparison], samples: dict[str, np.ndarray], where: str
 ) -> list[Claim]:
     """DE/best before DE/rand, DE/best before the GA, DE/rand before the GA."""
     by_pair, found = {(row.a, row.b): row for row in rows}, []

@@ -11,7 +11,8 @@ from evolution.judging.held_out import Judge
 from evolution.run.generation_loop import Experiment
 from evolution.settings.config import ExperimentConfig
 
-N_STARTS = 100
+FRESH_STARTS = 100
+"""Starts of the test of its best individual."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class FirstGeneration:
         fitness: name of the step fitness.
         individuals: how many were drawn.
         best: stored fitness of the best of them.
-        held_out: its mean on fresh starts.
+        held_out: mean of that individual on fresh starts.
         behaviour: share of those trials by behaviour class.
     """
 
@@ -44,7 +45,7 @@ def first_generation(config: ExperimentConfig, fitness: str) -> FirstGeneration:
     record = next(experiment.run())
     judge = Judge(experiment.scene, experiment.space, config.task)
     best = config.network.decode(experiment.best_genomes[0])
-    test = judge.test(best, N_STARTS)
+    test = judge.test(best, FRESH_STARTS)
     return FirstGeneration(
         fitness, record.evaluations, record.best, test.mean, test.behaviour
     )

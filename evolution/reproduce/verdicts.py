@@ -11,9 +11,9 @@ from math import comb, floor
 import numpy as np
 
 from evolution.pages.words import probability
-from evolution.report.pairs import PairRow
-from evolution.statistics.comparisons import FEWEST_FOR_STARS, LEVELS
-from evolution.statistics.samples import wilson
+from evolution.report.sections.comparisons import Comparison
+from evolution.statistics.estimates import wilson
+from evolution.statistics.significance import FEWEST_FOR_STARS, LEVELS
 
 CONSISTENT, INCONSISTENT = "consistent", "inconsistent"
 NOT_CONTRADICTED = "consistent, in that nothing contradicts it"
@@ -24,13 +24,13 @@ NOT_MEASURED = "can't be tested: not measured"
 OTHER_STUDY = "can't be tested: another study"
 
 
-def of_order(row: PairRow) -> str:
+def of_order(pair: Comparison) -> str:
     """Whether the first experiment of a pair exceeds the second."""
-    if not row.enough:
+    if not pair.enough:
         return TOO_FEW
-    if not row.decided:
+    if not pair.decided:
         return UNDECIDED
-    return CONSISTENT if row.a12 > 0.5 else INCONSISTENT
+    return CONSISTENT if pair.a12.value > 0.5 else INCONSISTENT
 
 
 def of_most(holds: np.ndarray) -> tuple[str, str]:

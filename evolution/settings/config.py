@@ -1,5 +1,6 @@
 """What an experiment is: typed, frozen, read from YAML, unknown keys refused."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -230,12 +231,33 @@ class ExperimentConfig(BaseModel):
 
 def differing_keys(stored: ExperimentConfig, asked: ExperimentConfig) -> list[str]:
     """What two configs disagree about, a text for each key."""
-    before, after = flat(stored), flat(asked)
     return [
-        f"{key} (stored {before.get(key)}, got {after.get(key)})"
-        for key in dict.fromkeys([*before, *after])
-        if before.get(key) != after.get(key)
+        f"{key} (stored {values.get('stored')}, got {values.get('asked')})"
+        for key, values in differences({"stored": stored, "asked": asked}).items()
     ]
+
+
+def differences(
+    configs: Mapping[str, ExperimentConfig], without: Sequence[str] = ()
+) -> dict[str, dict[str, Any]]:
+    """Keys in which configs differ, and the value of each config that has the key.
+
+    Args:
+        configs: by name.
+        without: keys that may differ.
+    """
+    each = {name: flat(config) for name, config in configs.items()}
+    keys = dict.fromkeys(key for fields in each.values() for key in fields)
+    found = {
+        key: {name: fields[key] for name, fields in each.items() if key in fields}
+        for key in keys
+        if key not in without
+    }
+    return {
+        key: values
+        for key, values in found.items()
+        if len(values) < len(each) or len(set(map(repr, values.values()))) > 1
+    }
 
 
 def flat(config: ExperimentConfig) -> dict[str, Any]:

@@ -8,12 +8,12 @@ import math
 
 import numpy as np
 
-from evolution.statistics.samples import (
+from evolution.statistics.estimates import (
     CONFIDENCE,
     FEWEST_FOR_INTERVAL,
     RESAMPLES,
     Interval,
-    checked,
+    checked_sample,
 )
 
 
@@ -30,7 +30,7 @@ def evaluations_to_target(
     Raises:
         ValueError: if a history is empty, not finite or its parts differ in length.
     """
-    evaluations, best = checked(evaluations), checked(best)
+    evaluations, best = checked_sample(evaluations), checked_sample(best)
     if evaluations.size != best.size:
         raise ValueError(
             f"expected as many evaluations as best fitnesses,"
@@ -108,7 +108,7 @@ def ecdf(hits: np.ndarray, budgets: np.ndarray) -> np.ndarray:
 
 def _cost(hits: np.ndarray, spent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Evaluations each run needed or wasted `(runs,)`, and whether it hit."""
-    hits, spent = np.asarray(hits, float), checked(spent)
+    hits, spent = np.asarray(hits, float), checked_sample(spent)
     if hits.shape != spent.shape:
         raise ValueError(
             f"expected a hit or nan for each of {spent.size} runs, got {hits.shape}"

@@ -1,45 +1,49 @@
 """Figures of a study that a paper could print, each with its caption."""
 
-from collections.abc import Callable, Iterator
-from types import MappingProxyType
+from collections.abc import Callable, Iterator, Mapping
 
 from matplotlib.figure import Figure
 
-from evolution.report.figures.behaviour import behaviour, trajectories
-from evolution.report.figures.champions import held_out, rungs, stored_and_held_out
-from evolution.report.figures.curves import fitness, fitness_all, targets
+from evolution.report.figures.behaviour_bars import behaviour_figure
+from evolution.report.figures.champions import (
+    held_out_figure,
+    rungs_figure,
+    stored_and_held_out_figure,
+)
+from evolution.report.figures.curves import (
+    growth_figure,
+    growths_figure,
+    targets_figure,
+)
+from evolution.report.figures.trajectories import trajectories_figure
 from evolution.study.data import StudyData
 
 Captioned = tuple[Figure, str]
 
-FIGURES: MappingProxyType[str, Callable[[StudyData], Captioned | None]] = (
-    MappingProxyType(
-        {
-            "fitness-all": fitness_all,
-            "targets": targets,
-            "held-out": held_out,
-            "stored-and-held-out": stored_and_held_out,
-            "rungs": rungs,
-            "behaviour": behaviour,
-            "trajectories": trajectories,
-        }
-    )
-)
+STUDY_FIGURES: Mapping[str, Callable[[StudyData], Captioned | None]] = {
+    "fitness-all": growths_figure,
+    "targets": targets_figure,
+    "held-out": held_out_figure,
+    "stored-and-held-out": stored_and_held_out_figure,
+    "rungs": rungs_figure,
+    "behaviour": behaviour_figure,
+    "trajectories": trajectories_figure,
+}
 """Figures of the whole study by file name; None where the study has nothing for it."""
 
 
-def figures(data: StudyData) -> Iterator[tuple[str, Figure, str]]:
+def drawn_figures(data: StudyData) -> Iterator[tuple[str, Figure, str]]:
     """File name, figure and caption of each figure that the study has data for.
 
-    First `fitness-<experiment>` of each experiment with runs, then `FIGURES`. There is
-    at least one run, as `load_study` sees to.
+    First `fitness-<experiment>` of each experiment with runs, then `STUDY_FIGURES`.
+    There is at least one run, as `load_study` sees to.
 
     Raises:
         UserError: if the wheeled robot cannot use the arena.
     """
     for name in data.with_runs:
-        yield f"fitness-{name}", *fitness(data, name)
-    for name, draw in FIGURES.items():
+        yield f"fitness-{name}", *growth_figure(data, name)
+    for name, draw in STUDY_FIGURES.items():
         drawn = draw(data)
         if drawn is not None:
             yield name, *drawn

@@ -15,28 +15,28 @@ from evolution.pages.style import (
     YARDSTICK_LOOK,
     YARDSTICK_SHORT,
     Look,
-    counted,
     counts,
     legend_below,
     looks,
     robot_panels,
+    with_count,
 )
 from evolution.pages.words import YARDSTICK_LABEL, robot_name
 from evolution.report.samples import disturbed
-from evolution.statistics.samples import quartiles
+from evolution.statistics.estimates import quartiles
 from evolution.study.data import StudyData
 
 MOST_COLUMNS = 3
 """Panels side by side."""
 
-SPREAD = 0.28
+DOT_SPREAD = 0.28
 """Farthest that a run's dot lies from its row, in rows."""
 
 CHAMPION = "A champion's held-out fitness is its mean on the test starts."
 
 
 @matplotlib.rc_context(PRINT)
-def stored_and_held_out(data: StudyData) -> tuple[Figure, str]:
+def stored_and_held_out_figure(data: StudyData) -> tuple[Figure, str]:
     """Held-out against stored fitness of every champion, a panel per experiment."""
     runs, styles = data.with_runs, looks(data)
     columns = min(len(runs), MOST_COLUMNS)
@@ -51,7 +51,7 @@ def stored_and_held_out(data: StudyData) -> tuple[Figure, str]:
         _draw_luck(axes, data, name, styles[name])
         if reference is not None:
             axes.axhline(reference, **YARDSTICK_LOOK, zorder=1)
-        axes.set_title(counted(name, len(each)))
+        axes.set_title(with_count(name, len(each)))
         axes.set(ylim=(0, data.steps), xlabel="runs, in order of stored fitness")
     for axes in grid[:, 0]:
         axes.set_ylabel(f"fitness (max {data.steps})")
@@ -82,10 +82,10 @@ def stored_and_held_out(data: StudyData) -> tuple[Figure, str]:
 
 
 @matplotlib.rc_context(PRINT)
-def held_out(data: StudyData) -> tuple[Figure, str]:
+def held_out_figure(data: StudyData) -> tuple[Figure, str]:
     """Held-out fitness of every champion, a row per experiment, a panel per robot."""
     runs, styles = data.with_runs, looks(data)
-    labels = [counted(name, len(each)) for name, each in runs.items()]
+    labels = [with_count(name, len(each)) for name, each in runs.items()]
     figure, panels = robot_panels(data, labels)
     lines = {
         "one run": Line2D([], [], color="0.4", ls="", marker="o", ms=3.5),
@@ -109,7 +109,7 @@ def held_out(data: StudyData) -> tuple[Figure, str]:
 
 
 @matplotlib.rc_context(PRINT)
-def rungs(data: StudyData) -> tuple[Figure, str] | None:
+def rungs_figure(data: StudyData) -> tuple[Figure, str] | None:
     """Held-out fitness on the last robot against the first; None if there is one."""
     if len(data.robots) < 2:
         return None
@@ -122,7 +122,7 @@ def rungs(data: StudyData) -> tuple[Figure, str] | None:
     for name, each in runs.items():
         x, y = data.held_out(name, first), data.held_out(name, last)
         axes.scatter(x, y, **_dots(styles[name]))
-        lines[counted(name, len(each))] = Line2D(
+        lines[with_count(name, len(each))] = Line2D(
             [], [], color=styles[name].color, ls="", marker=styles[name].marker, ms=4
         )
     x, y = data.yardstick_mean(first), data.yardstick_mean(last)
@@ -181,7 +181,7 @@ def _dots(look: Look, filled: bool = True) -> dict[str, Any]:
 def _draw_row(axes: Axes, row: int, sample: np.ndarray, look: Look) -> None:
     """Values `(runs,)` as dots around a row; of two and more, median and quartiles."""
     # multiples of the golden ratio never pile up
-    offset = SPREAD * (2 * ((np.arange(sample.size) * 0.618034 + 0.5) % 1) - 1)
+    offset = DOT_SPREAD * (2 * ((np.arange(sample.size) * 0.618034 + 0.5) % 1) - 1)
     axes.scatter(sample, row + offset, **_dots(look))
     if sample.size == 1:
         return

@@ -15,10 +15,10 @@ from evolution.pages.style import (
     YARDSTICK_SHORT,
     Look,
     count_evaluations,
-    counted,
     counts,
     legend_below,
     looks,
+    with_count,
 )
 from evolution.pages.words import YARDSTICK_LABEL, label, robot_name
 from evolution.report.samples import TARGET_SHARES, hits
@@ -31,7 +31,9 @@ N_POINTS = 150
 N_MARKERS = 6
 """Markers along a curve, which tell it apart where colour is missing."""
 
-STORED = "Stored fitness is what evolution believes: the mean of the few trials it ran."
+STORED_NOTE = (
+    "Stored fitness is what evolution believes: the mean of the few trials it ran."
+)
 
 
 def on_grid(
@@ -64,7 +66,7 @@ def curves(runs: Sequence[RunData], column: str, grid: np.ndarray) -> np.ndarray
 
 
 @matplotlib.rc_context(PRINT)
-def fitness(data: StudyData, name: str) -> tuple[Figure, str]:
+def growth_figure(data: StudyData, name: str) -> tuple[Figure, str]:
     """Population best and mean of an experiment, as in figures 3 to 5 of the paper.
 
     Raises:
@@ -90,17 +92,17 @@ def fitness(data: StudyData, name: str) -> tuple[Figure, str]:
         lines[f"population {column}"] = line
     of_yardstick = _draw_yardstick(axes, data, lines)
     _stored_axes(axes, data, grid[-1])
-    legend_below(figure, lines, title=counted(name, len(runs)))
+    legend_below(figure, lines, title=with_count(name, len(runs)))
     caption = (
         f"{label(name)}: stored fitness of the best of the population and its mean "
         "against evaluations. Median and interquartile range over runs "
-        f"(n = {len(runs)}); thin: the single runs. {STORED}{of_yardstick}"
+        f"(n = {len(runs)}); thin: the single runs. {STORED_NOTE}{of_yardstick}"
     )
     return figure, caption
 
 
 @matplotlib.rc_context(PRINT)
-def fitness_all(data: StudyData) -> tuple[Figure, str]:
+def growths_figure(data: StudyData) -> tuple[Figure, str]:
     """Best so far of all experiments on one axes."""
     figure = Figure(figsize=(COLUMN, 3.3), layout="constrained")
     axes = figure.add_subplot()
@@ -119,20 +121,20 @@ def fitness_all(data: StudyData) -> tuple[Figure, str]:
         )
         line = _median_and_band(axes, grid, best, styles[name].color)
         _mark(line, styles[name], grid.size, i, len(runs))
-        lines[counted(name, len(each))] = line
+        lines[with_count(name, len(each))] = line
         last = max(last, grid[-1])
     of_yardstick = _draw_yardstick(axes, data, lines)
     _stored_axes(axes, data, last)
     legend_below(figure, lines)
     caption = (
         "Best stored fitness so far against evaluations: median and interquartile "
-        f"range over runs ({counts(data)}). {STORED}{of_yardstick}"
+        f"range over runs ({counts(data)}). {STORED_NOTE}{of_yardstick}"
     )
     return figure, caption
 
 
 @matplotlib.rc_context(PRINT)
-def targets(data: StudyData) -> tuple[Figure, str]:
+def targets_figure(data: StudyData) -> tuple[Figure, str]:
     """Share of all pairs of run and target reached, against evaluations."""
     figure = Figure(figsize=(COLUMN, 3.2), layout="constrained")
     axes = figure.add_subplot()
@@ -145,7 +147,7 @@ def targets(data: StudyData) -> tuple[Figure, str]:
             budgets, share, color=styles[name].color, drawstyle="steps-post"
         )
         _mark(line, styles[name], budgets.size, i, len(runs))
-        lines[counted(name, len(each))] = line
+        lines[with_count(name, len(each))] = line
     count_evaluations(axes, last)
     axes.set(ylabel="share of (run, target) pairs", ylim=(0, 1.02))
     legend_below(figure, lines)

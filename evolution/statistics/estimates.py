@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 FEWEST_FOR_INTERVAL = 5
 """Runs of the smallest sample of which a comparison or a cost has an interval.
@@ -26,7 +25,7 @@ CONFIDENCE = 0.95
 """Probability of all intervals to hold the true value: the 95 % of every text."""
 
 RESAMPLES = 2000
-"""Of each bootstrap."""
+"""Resamples of each bootstrap."""
 
 BATCH = 200
 """Resamples in memory at once: small arrays stay in the cache."""
@@ -39,7 +38,7 @@ class Interval:
     Attributes:
         value: the estimate itself.
         low: lower bound, nan if one run says nothing about the spread.
-        high: upper bound, likewise.
+        high: upper bound, nan if so is the lower one.
     """
 
     value: float
@@ -52,7 +51,7 @@ def mean_interval(sample: np.ndarray, rng: np.random.Generator) -> Interval:
 
     Source: Efron 1987, "Better bootstrap confidence intervals".
     """
-    sample = checked(sample)
+    sample = checked_sample(sample)
     value = float(sample.mean())
     if sample.size < 2:
         return Interval(value, math.nan, math.nan)
@@ -70,7 +69,9 @@ def wilson(successes: int, n: int) -> Interval:
     Raises:
         ValueError: if there are no trials or more successes than trials.
     """
-    check_successes(successes, n)
+    from scipy import stats
+
+    refuse_no_share(successes, n)
     test = stats.binomtest(successes, n)
     low, high = test.proportion_ci(CONFIDENCE, method="wilson")
     return Interval(successes / n, float(low), float(high))
@@ -87,7 +88,7 @@ class Quartiles:
 
 def quartiles(sample: np.ndarray) -> Quartiles:
     """Quartiles of `(n,)`, interpolated as numpy does by default."""
-    return Quartiles(*np.quantile(checked(sample), [0.25, 0.5, 0.75]).tolist())
+    return Quartiles(*np.quantile(checked_sample(sample), [0.25, 0.5, 0.75]).tolist())
 
 
 def worst_share_mean(sample: np.ndarray, share: float = 0.05) -> float:
@@ -98,7 +99,7 @@ def worst_share_mean(sample: np.ndarray, share: float = 0.05) -> float:
     Raises:
         ValueError: if the share is not in (0, 1].
     """
-    sample = checked(sample)
+    sample = checked_sample(sample)
     if not 0 < share <= 1:
         raise ValueError(f"expected a share in (0, 1], got {share}")
     # a share such as 0.07 of 100 is a little more than 7 in floats
@@ -106,7 +107,7 @@ def worst_share_mean(sample: np.ndarray, share: float = 0.05) -> float:
     return float(np.sort(sample)[: max(n_worst, 1)].mean())
 
 
-def checked(sample: np.ndarray) -> np.ndarray:
+def checked_sample(sample: np.ndarray) -> np.ndarray:
     """A sample `(n,)` as floats.
 
     Raises:
@@ -121,8 +122,8 @@ def checked(sample: np.ndarray) -> np.ndarray:
     return sample
 
 
-def check_successes(successes: int, n: int) -> None:
-    """Refuse a share that is none.
+def refuse_no_share(successes: int, n: int) -> None:
+    """Refuse numbers of successes that no trials can have.
 
     Raises:
         ValueError: if there are no trials or more successes than trials.
@@ -145,6 +146,8 @@ def bootstrap(
         method: as scipy calls it.
         rng: draws the resamples.
     """
+    from scipy import stats
+
     interval = stats.bootstrap(
         samples,
         statistic,
@@ -159,8 +162,13 @@ def bootstrap(
 
 
 def rank_correlation(a: np.ndarray, b: np.ndarray) -> float | None:
-    """Spearman's of `(n,)` and `(n,)`; None of fewer than 5 pairs or equal values."""
+    """Spearman's rank correlation of `(n,)` and `(n,)`.
+
+    None of fewer than 5 pairs, or if all values of one are equal.
+    """
     if a.size < FEWEST_FOR_RANKS or np.ptp(a) == 0 or np.ptp(b) == 0:
         return None
+    from scipy import stats
+
     result: Any = stats.spearmanr(a, b)
     return float(result.statistic)

@@ -37,10 +37,7 @@ def ideal(
     threads: int,
     arena: str | None = None,
 ) -> list[Outcome]:
-    """Each policy on an ideal robot, on `n` test starts, in the arena it evolved in.
-
-    Or all of them in the same `arena`.
-    """
+    """Each policy on an ideal robot, on `n` test starts, in one arena or its own."""
     scenes = cache(lambda arena, step: load_scene(robot, arena, step))
     free = cache(FreeSpace)
     outcomes = []

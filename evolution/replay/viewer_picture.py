@@ -1,5 +1,6 @@
-"""A picture of a recording in rerun's viewer: `python -m benchmarks.viewer_picture`.
+"""A picture of a recording in rerun's viewer, for documents.
 
+`python -m evolution.replay.viewer_picture RECORDING --output PICTURE`.
 The viewer runs without a window; it needs a Vulkan driver, of which Mesa's for the
 processor will do (Debian: mesa-vulkan-drivers).
 """
@@ -23,14 +24,14 @@ from epuck_mj.host.files import write_bytes, writing
 from evolution.replay.viewer import viewer_binary
 from evolution.replay.web import free_ports
 
-PATIENCE = 60.0
+VIEWER_PATIENCE = 60.0
 """How long the viewer may take to do what it is asked for [s]."""
 
 Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
-class Options:
+class ViewerPictureOptions:
     """Draw what the rerun viewer shows of a recording, without a window.
 
     Attributes:
@@ -47,7 +48,7 @@ class Options:
 
 
 @contextmanager
-def viewer(recording: Path, size: tuple[int, int]) -> Iterator[ViewerClient]:
+def headless_viewer(recording: Path, size: tuple[int, int]) -> Iterator[ViewerClient]:
     """A viewer without a window that has loaded a recording.
 
     Raises:
@@ -95,7 +96,7 @@ def viewer(recording: Path, size: tuple[int, int]) -> Iterator[ViewerClient]:
             process.wait()
 
 
-def picture(client: ViewerClient, time: float) -> bytes:
+def viewer_screenshot(client: ViewerClient, time: float) -> bytes:
     """What the viewer shows at a time of the trial [s], once it has settled, as PNG."""
     client.set_time("sim_time", duration=time, play_state="paused")
     shots = [client.take_screenshot()]
@@ -109,29 +110,31 @@ def picture(client: ViewerClient, time: float) -> bytes:
 
 def _until(attempt: Callable[[], Value | None]) -> Value:
     """What an attempt gives, as soon as that is something."""
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + VIEWER_PATIENCE
     while (value := attempt()) is None:
         if time.monotonic() > end:
-            raise UserError(f"the rerun viewer took more than {PATIENCE:g} s")
+            raise UserError(f"the rerun viewer took more than {VIEWER_PATIENCE:g} s")
         time.sleep(0.2)
     return value
 
 
-def draw(argv: Sequence[str]) -> int:
+def picture_viewer(argv: Sequence[str]) -> int:
     """Run the command line; its exit status.
 
     Raises:
         UserError: if the viewer does not work, or the file cannot be written.
     """
-    options = parse(Options, "python -m benchmarks.viewer_picture", argv)
+    options = parse(
+        ViewerPictureOptions, "python -m evolution.replay.viewer_picture", argv
+    )
     if not options.recording.is_file():
         raise UserError(f"no recording '{options.recording}'")
-    with viewer(options.recording, options.size) as client:
-        pixels = picture(client, options.time)
+    with headless_viewer(options.recording, options.size) as client:
+        pixels = viewer_screenshot(client, options.time)
     with writing():
         write_bytes(options.output, pixels)
     return 0
 
 
 if __name__ == "__main__":
-    main(draw)
+    main(picture_viewer)

@@ -1,19 +1,19 @@
-"""The frame of a report: what was run and is missing, and how to get it again."""
+"""What was run: title, what is missing, and the experiments."""
 
 import numpy as np
 
 from evolution.judging.starts import N_VALIDATION
-from evolution.pages.blocks import Block, Code, Heading, Listing, Paragraph, Table
+from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
 from evolution.pages.words import NOTHING, evaluations, label, robot_name, spread
+from evolution.report.measures import shown_robots
+from evolution.report.run_table import control_steps
 from evolution.report.samples import tests_of
-from evolution.report.summary import commands, config_differences
-from evolution.report.tables import control_steps, provenance, shown_robots
 from evolution.run.champion import BEST_OF_POPULATION, LATEST_BEST
 from evolution.study.config import seeds_text
 from evolution.study.data import StudyData
 
 
-def what_was_run(data: StudyData) -> list[Block]:
+def what_was_run_section(data: StudyData) -> list[Block]:
     """Title, what is missing, and the experiments."""
     runs = data.with_runs
     sizes = sorted({len(each) for each in runs.values()})
@@ -103,52 +103,3 @@ def what_was_run(data: StudyData) -> list[Block]:
 def _steps(data: StudyData, name: str) -> str:
     counted = [control_steps(run) for run in data.runs[name]]
     return spread(np.array([steps for steps in counted if steps], float), 1e-6)
-
-
-def how_to_reproduce(data: StudyData, output: str, ioh: bool) -> list[Block]:
-    """Files, commands, and where the runs came from."""
-    came_from = provenance(data)
-    blocks: list[Block] = [
-        Heading("How to get every number again"),
-        Listing(
-            [
-                "runs.csv: every run. Tables of this page are made of it, "
-                "pairwise.csv, success.csv and targets.csv; summary.json has all.",
-                *(["ioh/: the histories, for IOHanalyzer."] if ioh else []),
-                "Random numbers of intervals are drawn from a fixed seed: the same "
-                "study gives the same bytes.",
-            ]
-        ),
-    ]
-    for what, line in commands(data, output, ioh).items():
-        blocks += [Paragraph(f"{what[0].upper()}{what[1:]}:"), Code([line])]
-    blocks += [
-        Paragraph(
-            "The runs were begun with these arguments of python -m evolution.study or "
-            "evolution.run:"
-        ),
-        Code(came_from["argv"] or [NOTHING]),
-        Paragraph("Code, versions and processors of the runs:"),
-        Listing(
-            [
-                f"commit {NOTHING if not came_from['git'] else ''}"
-                + "; ".join(came_from["git"]),
-                *came_from["versions"],
-                *came_from["processor"],
-            ]
-        ),
-    ]
-    differences = config_differences(data)
-    if differences:
-        names = list(data.configs)
-        blocks += [
-            Paragraph("The experiments differ in these keys:"),
-            Table(
-                ("key", *(label(name) for name in names)),
-                [
-                    (key, *(str(values.get(name, NOTHING)) for name in names))
-                    for key, values in differences.items()
-                ],
-            ),
-        ]
-    return blocks

@@ -1,4 +1,4 @@
-"""Ships the studies in runs/: `python -m benchmarks.publish`.
+"""Ships the studies in runs/: `python -m evolution.reproduce.publish`.
 
 Copies what of each finished run is small enough for git, reports it, holds the paper's
 claims against it, and puts its table into the README.
@@ -13,8 +13,8 @@ from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse
 from evolution.pages.blocks import to_markdown
-from evolution.reproduce.__main__ import reproduce
-from evolution.reproduce.document import runs_table
+from evolution.reproduce.__main__ import reproduce_paper
+from evolution.reproduce.reproduction import runs_table
 from evolution.run.directory import RunDirectory
 from evolution.study.data import load_study
 from evolution.study.directory import StudyDirectory
@@ -25,11 +25,11 @@ REPORTED = ("paper", "wheels")
 TRANSFER = "transfer"
 """The study of robots that differ; the gap measures it."""
 
-README = Path("README.md")
+README_FILE = Path("README_FILE.md")
 
 
 @dataclass(frozen=True)
-class Options:
+class PublishOptions:
     """Ship the finished runs of the studies in runs/; to be called at the top.
 
     Without these folders, everything is made anew from what was shipped before.
@@ -38,20 +38,22 @@ class Options:
 
 def publish(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
-    parse(Options, "python -m benchmarks.publish", argv, Options())
+    parse(
+        PublishOptions, "python -m evolution.reproduce.publish", argv, PublishOptions()
+    )
     for name in (*REPORTED, TRANSFER):
         if (Path("runs") / name).is_dir():
             ship(Path("runs") / name, Path("results") / name)
     paper, *others = (str(path) for path in shipped(Path("results")))
     wheels = [argument for path in others for argument in ("--wheels", path)]
-    reproduce(["--study", paper, *wheels, "--output", "results"])
+    reproduce_paper(["--study", paper, *wheels, "--output", "results"])
     _write_readme()
     return 0
 
 
 def _write_readme() -> None:
-    text = with_tables(README.read_text(encoding="utf-8"), Path("results"))
-    files.write_text(README, text)
+    text = with_tables(README_FILE.read_text(encoding="utf-8"), Path("results"))
+    files.write_text(README_FILE, text)
 
 
 def shipped(results: Path) -> list[Path]:

@@ -39,7 +39,7 @@ GROUP_COLUMNS = (
 )
 
 
-def summary(
+def gap_summary(
     transfers: Mapping[str, Transfer],
     groups: Mapping[str, Sequence[int]],
     peers: Mapping[str, Sequence[int]],
@@ -49,7 +49,7 @@ def summary(
     Args:
         transfers: by robot.
         groups: indices of the policies of each experiment.
-        peers: of each speed.
+        peers: indices of the policies of each speed.
     """
     rows = []
     for group, members in groups.items():
@@ -80,7 +80,7 @@ def by_latency(
     groups: Mapping[str, Sequence[int]],
     latency: np.ndarray,
 ) -> Table:
-    """What is kept when commands are late: a row per experiment and robot, mean shares.
+    """Mean shares kept when commands are late: a row per experiment and robot.
 
     Args:
         transfers: by robot.
@@ -99,7 +99,7 @@ def by_latency(
     return Table(("experiment", "robot", "n", *map(str, late)), rows, texts=2)
 
 
-def document(
+def gap_document(
     names: Sequence[str],
     transfers: Mapping[str, Transfer],
     groups: Mapping[str, Sequence[int]],
@@ -107,13 +107,13 @@ def document(
     starts: int,
     latency: np.ndarray,
 ) -> list[Block]:
-    """What was found.
+    """The document: what was found, as blocks.
 
     Args:
         names: of the policies.
         transfers: by robot, at least one.
         groups: indices of the policies of each experiment.
-        peers: of each speed.
+        peers: indices of the policies of each speed.
         starts: of each world, and at home.
         latency: of each world, in control steps, `(w,)`.
     """
@@ -131,7 +131,7 @@ def document(
             "the fitness at home is all that counts. In brackets, 95 % intervals over "
             "the worlds; they leave out the starts, which are the same in every world."
         ),
-        summary(transfers, groups, peers),
+        gap_summary(transfers, groups, peers),
         Paragraph(
             "Medians over the policies of an experiment, of their means. Randomised "
             "robots of evolution and worlds share the ranges of wheel radius, track, "
@@ -157,7 +157,7 @@ def document(
 def _ranks(
     transfers: Mapping[str, Transfer], peers: Mapping[str, Sequence[int]]
 ) -> list[Block]:
-    """How ranks agree; nothing of too few policies."""
+    """Rank correlations in words; no block if all policies are too few."""
     items = []
     for speed, members in peers.items():
         for robot, transfer in transfers.items():

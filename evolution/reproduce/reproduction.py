@@ -13,77 +13,19 @@ from evolution.pages.blocks import (
     to_markdown,
 )
 from evolution.pages.words import SPREAD, label, median_and_quartiles, spread
+from evolution.report.measures import shown_robots
 from evolution.report.samples import kept, most_believed
-from evolution.report.tables import shown_robots
 from evolution.reproduce.claims import (
-    PAPER,
     REPLICATES,
     Claim,
     claims,
     held_out_order,
     tally,
-    unlike,
 )
+from evolution.reproduce.differences_from_paper import differences_from_paper
 from evolution.reproduce.first_generation import FirstGeneration
 from evolution.reproduce.verdicts import fewest_to_contradict
-from evolution.study.config import StudyConfig, find_study
 from evolution.study.data import StudyData
-
-DIFFERENCES = (
-    ("simulator", "Player/Stage, 2D", "MuJoCo, 3D; planar robot, tested on wheels"),
-    ("drive", "not said", "wheels follow a command with a time constant of 15 ms"),
-    ("steps of a trial", "not legible", "{base.steps} of {base.control_step} s"),
-    ("arena", "square, as in their laboratory", "1.0 m square"),
-    (
-        "speeds",
-        "not said",
-        "{base.v_max:.4g} m/s and {base.w_max:.4g} rad/s, the hardware's limits",
-    ),
-    (
-        "sensors",
-        "0 near to 1 free, 4 cm",
-        "the same, linear along eight rays at the angles Player has, without noise",
-    ),
-    (
-        "crash",
-        "not said what counts",
-        "the shell touches a wall at the end of a control step",
-    ),
-    (
-        "fitness",
-        "equation (2), which as printed rewards circles in the open",
-        "its prose: fast, straight and near a wall, multiplied",
-    ),
-    ("weights", "range not said", "within +-{base.weight_bound}, no biases"),
-    ("first weights", "random", "uniform within +-{base.weight_init}"),
-    (
-        "DE outside the bounds",
-        "not said",
-        "{best.bounds_rule} between parent and bound",
-    ),
-    ("DE's r1, r2, r3", "random", "unlike each other and the parent"),
-    (
-        "GA",
-        "binary; tournament size not legible, operators not said",
-        "{ga.bits} bits a weight, tournament of {ga.tournament}, one-point crossover, "
-        "{ga.elites} elites",
-    ),
-    (
-        "budget",
-        '"until an optimal level is reached"; 30,000 evaluations, though the 250 '
-        "generations of DE/best are 37,500",
-        "{base.evaluations:,} evaluations for every algorithm; 37,500 were not run",
-    ),
-    (
-        "starts",
-        "random",
-        "fresh for every generation, the same for all its individuals",
-    ),
-    ("replicates", '"at least three"', "n as stated beside each number"),
-    ("the best", "highest stored fitness", "chosen on 200 starts, reported on 1,000"),
-    ("robot", "a physical e-puck", "none"),
-)
-"""What, in the paper, in the shipped experiments."""
 
 
 def reproduction(
@@ -158,7 +100,10 @@ def reproduction(
             Heading("Why equation (2) is not taken as printed"),
             *_unevolved(unevolved, study.steps),
         ]
-    blocks += [Heading("What differs from the original"), *_differences(study)]
+    blocks += [
+        Heading("What differs from the original"),
+        *differences_from_paper(study),
+    ]
     return to_markdown(blocks)
 
 
@@ -290,17 +235,3 @@ def _unevolved(found: Sequence[FirstGeneration], steps: int) -> list[Block]:
             rows,
         ),
     ]
-
-
-def _differences(study: StudyData) -> list[Block]:
-    shipped = StudyConfig.load(find_study(PAPER)).experiments
-    best, ga = shipped["de-best"], shipped["ga"]
-    values = {"base": best, "best": best.optimizer, "ga": ga.optimizer}
-    rows = [[what, paper, here.format(**values)] for what, paper, here in DIFFERENCES]
-    blocks: list[Block] = [Table(["", "paper", "shipped experiments"], rows, texts=3)]
-    if further := unlike(study):
-        blocks += [
-            Paragraph("The experiments of this study differ from the shipped ones in"),
-            Listing(further),
-        ]
-    return blocks

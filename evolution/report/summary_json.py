@@ -1,4 +1,4 @@
-"""Everything that a study has found, as JSON values."""
+"""summary.json: everything that a study has found."""
 
 import json
 import math
@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from epuck_mj.policies.wall_follower import YARDSTICK
 from epuck_mj.trials.behaviour_classes import HUG
-from evolution.pages.words import command_line, label
-from evolution.report.pairs import pair_rows
+from evolution.pages.words import label
+from evolution.report.measures import shown_robots
+from evolution.report.run_table import run_rows
 from evolution.report.samples import (
     class_means,
     clearances,
@@ -21,55 +21,16 @@ from evolution.report.samples import (
     most_believed,
     tests_of,
 )
-from evolution.report.successes import success_rows
-from evolution.report.tables import provenance, run_rows, shown_robots, target_rows
-from evolution.run.directory import RunDirectory
-from evolution.settings.config import ExperimentConfig, flat
-from evolution.statistics.samples import quartiles, rank_correlation
+from evolution.report.sections.comparisons import pair_rows
+from evolution.report.sections.cost_of_targets import target_rows
+from evolution.report.sections.how_to_get_every_number_again import commands, origins
+from evolution.report.sections.success import success_rows
+from evolution.settings.config import ExperimentConfig, differences, flat
+from evolution.statistics.estimates import quartiles, rank_correlation
 from evolution.study.data import StudyData
 
 
-def config_differences(data: StudyData) -> dict[str, dict[str, Any]]:
-    """Keys in which the experiments differ, and the value of each that has it."""
-    each = {name: _keys(config) for name, config in data.configs.items()}
-    keys = dict.fromkeys(key for fields in each.values() for key in fields)
-    found = {
-        key: {name: fields[key] for name, fields in each.items() if key in fields}
-        for key in keys
-    }
-    return {
-        key: values
-        for key, values in found.items()
-        if len(values) < len(each) or len(set(map(repr, values.values()))) > 1
-    }
-
-
-def commands(data: StudyData, output: str, ioh: bool) -> dict[str, str]:
-    """What to type to get every number again, by what it gives."""
-    study = data.path.as_posix()
-    run = next(run for runs in data.runs.values() for run in runs)
-    again = ["--ioh"] if ioh else []
-    return {
-        "this report": command_line(
-            "evolution.report", study, "--output", output, *again
-        ),
-        "held-out fitness and behaviour of every champion": command_line(
-            "evolution.evaluate", study
-        ),
-        "whether every champion scores the same on this machine": command_line(
-            "evolution.verify", study
-        ),
-        "the hand-written wall follower": command_line("evolution.evaluate", YARDSTICK),
-        "one run, byte for byte (any other likewise)": command_line(
-            "evolution.run",
-            RunDirectory(run.path).config.as_posix(),
-            "--output",
-            f"runs/again-{run.path.parent.name}-{run.seed}",
-        ),
-    }
-
-
-def summary(data: StudyData, output: str, ioh: bool) -> dict[str, Any]:
+def summary_fields(data: StudyData, output: str, ioh: bool) -> dict[str, Any]:
     """Everything as JSON values; null is what is not known, or not finite.
 
     Args:
@@ -84,24 +45,24 @@ def summary(data: StudyData, output: str, ioh: bool) -> dict[str, Any]:
             "robots": list(shown_robots(data)),
             "missing": list(data.missing),
             "experiments": {name: _experiment(data, name) for name in data.configs},
-            "config_differences": config_differences(data),
+            "config_differences": differences(data.configs, ("seed",)),
             "configs": {name: _keys(config) for name, config in data.configs.items()},
             "yardstick": {
                 robot: test.to_dict() for robot, test in data.yardstick.items()
             },
             "runs": run_rows(data),
-            "pairwise": list(map(asdict, pair_rows(data))),
-            "success": list(map(asdict, success_rows(data))),
-            "targets": list(map(asdict, target_rows(data))),
-            "provenance": provenance(data),
+            "pairwise": pair_rows(data),
+            "success": success_rows(data),
+            "targets": [asdict(row) for row in target_rows(data)],
+            "provenance": origins(data),
             "commands": commands(data, output, ioh),
         }
     )
 
 
-def summary_text(summary: dict[str, Any]) -> str:
+def summary_text(fields: dict[str, Any]) -> str:
     """The text of summary.json."""
-    return json.dumps(summary, indent=1, allow_nan=False) + "\n"
+    return json.dumps(fields, indent=1, allow_nan=False) + "\n"
 
 
 def _experiment(data: StudyData, name: str) -> dict[str, Any]:

@@ -1,0 +1,96 @@
+"""Behaviour: what champions do, and how close to the wall they ride."""
+
+import math
+
+from epuck_mj.trials.behaviour_classes import HUG, MEANINGS
+from epuck_mj.trials.metrics import FOLLOWING_SHARE
+from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
+from evolution.pages.words import (
+    NOTHING,
+    YARDSTICK_LABEL,
+    label,
+    percent,
+    percent_median,
+    robot_name,
+    spread,
+)
+from evolution.report.measures import shown_robots
+from evolution.report.samples import (
+    class_means,
+    clearances,
+    whole_laps,
+)
+from evolution.study.data import StudyData
+
+
+def behaviour_section(data: StudyData) -> list[Block]:
+    """What champions do, and how close to the wall they ride."""
+    shares = {
+        (name, robot): class_means(data, name, robot)
+        for robot in shown_robots(data)
+        for name in data.with_runs
+    }
+    classes = dict.fromkeys(name for each in shares.values() for name in each)
+    seen = [c for c in classes if any(each.get(c) for each in shares.values())]
+    if not seen:
+        return [
+            Heading("Behaviour"),
+            Paragraph("Not known: no run has behaviour classes."),
+        ]
+    rows = []
+    for (name, robot), each in shares.items():
+        near = clearances(data, name, robot)
+        rows.append(
+            (
+                label(name),
+                robot_name(robot),
+                *(percent(each.get(c, 0.0) if each else None) for c in seen),
+                spread(near, 1000),
+                f"{(near < HUG).sum()} of {near.size}",
+                percent_median(whole_laps(data, name, robot)),
+            )
+        )
+    for robot in shown_robots(data):
+        test = data.yardstick.get(robot)
+        if test and test.behaviour:
+            near = test.clearance
+            rows.append(
+                (
+                    YARDSTICK_LABEL,
+                    robot_name(robot),
+                    *(percent(test.behaviour.get(c, 0.0)) for c in seen),
+                    NOTHING if math.isnan(near) else f"{near * 1000:.1f}",
+                    NOTHING,
+                    percent(test.whole_laps),
+                )
+            )
+    return [
+        Heading("Behaviour"),
+        Paragraph(
+            "Share of the test trials in each class, mean over runs; mean clearance "
+            "from shell to wall in mm while a wall is near, median [quartiles] over "
+            f"runs; champions whose mean clearance is below {HUG * 1000:.0f} mm. A "
+            "champion that rides so close is a reality gap in waiting: a real robot's "
+            "sensors and wheels err by more. A trial has the first class that fits:"
+        ),
+        Listing([f"{name}: {MEANINGS[name]}" for name in MEANINGS if name in seen]),
+        Paragraph(
+            "Whole lap, median over runs: the share of all trials that go all round "
+            "the arena without a crash, near walls in "
+            f"{FOLLOWING_SHARE:.0%} of the time from the first on. Few trials have "
+            "time for one: at top speed the 30 s of the paper's experiments are 3.9 m, "
+            "once round its arena is 3.5 m, and the first wall has to be found."
+        ),
+        Table(
+            (
+                "experiment",
+                "robot",
+                *seen,
+                "clearance [mm]",
+                f"below {HUG * 1000:.0f} mm",
+                "whole lap",
+            ),
+            rows,
+            texts=2,
+        ),
+    ]

@@ -1,0 +1,201 @@
+"""Comparisons: each pair of experiments by the Mann-Whitney test."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+
+from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
+from evolution.pages.words import between, label, probability, robot_name
+from evolution.report.contests import Contest, contests
+from evolution.report.measures import (
+    generator,
+    held_out_measure,
+    measure_title,
+    measures,
+    shown_robots,
+)
+from evolution.statistics.effect_sizes import a12_interval, median_difference
+from evolution.statistics.estimates import FEWEST_FOR_INTERVAL, Interval
+from evolution.statistics.significance import FEWEST_FOR_STARS, mann_whitney, stars
+from evolution.study.data import StudyData
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison(Contest):
+    """Two experiments held against each other in one measure.
+
+    Attributes:
+        a12: probability that a run of the first exceeds one of the second; without
+            bounds below 5 runs.
+        shift: median of the first minus that of the second.
+    """
+
+    a12: Interval
+    shift: Interval
+
+    def turned(self) -> Self:
+        """This comparison, the second experiment first."""
+        a12, shift = self.a12, self.shift
+        return replace(
+            self,
+            a=self.b,
+            b=self.a,
+            of_a=self.of_b,
+            of_b=self.of_a,
+            a12=Interval(1 - a12.value, 1 - a12.high, 1 - a12.low),
+            shift=Interval(-shift.value, -shift.high, -shift.low),
+        )
+
+
+def comparisons_of(
+    samples: Mapping[str, np.ndarray], alike: Callable[[str, str], bool]
+) -> list[Comparison]:
+    """A comparison per pair of experiments within one measure.
+
+    Args:
+        samples: of each experiment, `(runs,)`, none of them empty.
+        alike: whether two experiments can be compared.
+    """
+    return [
+        Comparison(
+            **vars(each),
+            a12=_effect(each.of_a, each.of_b),
+            shift=median_difference(each.of_a, each.of_b, generator()),
+        )
+        for each in contests(samples, alike, lambda a, b: mann_whitney(a, b).p)
+    ]
+
+
+def _effect(a: np.ndarray, b: np.ndarray) -> Interval:
+    """A12, without an interval of few runs."""
+    effect = a12_interval(a, b)
+    if min(a.size, b.size) < FEWEST_FOR_INTERVAL:
+        return Interval(effect.value, math.nan, math.nan)
+    return effect
+
+
+def comparisons(data: StudyData) -> dict[str, list[Comparison]]:
+    """Every comparison of a study, by measure."""
+    return {
+        measure: comparisons_of(samples, data.alike)
+        for measure, samples in measures(data).items()
+    }
+
+
+PAIR_COLUMNS: Mapping[str, Callable[[Comparison], Any]] = {
+    "a": lambda pair: pair.a,
+    "b": lambda pair: pair.b,
+    "n_a": lambda pair: pair.of_a.size,
+    "n_b": lambda pair: pair.of_b.size,
+    "median_a": lambda pair: float(np.median(pair.of_a)),
+    "median_b": lambda pair: float(np.median(pair.of_b)),
+    "u": lambda pair: mann_whitney(pair.of_a, pair.of_b).u,
+    "p": lambda pair: pair.p,
+    "method": lambda pair: mann_whitney(pair.of_a, pair.of_b).method,
+    "p_holm": lambda pair: pair.p_holm,
+    "family": lambda pair: pair.family,
+    "a12": lambda pair: pair.a12.value,
+    "a12_low": lambda pair: pair.a12.low,
+    "a12_high": lambda pair: pair.a12.high,
+    "median_difference": lambda pair: pair.shift.value,
+    "median_difference_low": lambda pair: pair.shift.low,
+    "median_difference_high": lambda pair: pair.shift.high,
+    "stars": lambda pair: stars(pair.p_holm, min(pair.of_a.size, pair.of_b.size)),
+}
+"""Columns of pairwise.csv after the measure."""
+
+
+def pair_rows(data: StudyData) -> list[dict[str, Any]]:
+    """A row per measure and comparison, as `PAIR_COLUMNS` says."""
+    return [
+        {"measure": measure}
+        | {column: value(pair) for column, value in PAIR_COLUMNS.items()}
+        for measure, pairs in comparisons(data).items()
+        for pair in pairs
+    ]
+
+
+def comparisons_section(data: StudyData) -> list[Block]:
+    """Pairs of experiments, in words for the first robot and in tables for all."""
+    found = comparisons(data)
+    first = shown_robots(data)[0]
+    own = found[held_out_measure(first)]
+    blocks: list[Block] = [Heading("Comparisons")]
+    if not own:
+        return [*blocks, Paragraph("One experiment with runs: nothing to compare.")]
+    blocks.append(
+        Paragraph(
+            "Two-sided Mann-Whitney tests over runs; Holm's adjustment within each "
+            f"table ({own[0].family} pairs). A12 is the probability that a run of the "
+            "first exceeds one of the second (0.5: no effect), with a 95 % interval; "
+            "the difference of medians has a bootstrap 95 % interval. Below "
+            f"{FEWEST_FOR_INTERVAL} runs there are no intervals, which would not hold "
+            f"their 95 %; below {FEWEST_FOR_STARS} no stars and no verdict."
+        )
+    )
+    blocks += [
+        Paragraph(f"In held-out fitness on the {robot_name(first)}:"),
+        Listing([compared(pair, label(pair.a), label(pair.b)) for pair in own]),
+    ]
+    for measure, pairs in found.items():
+        blocks += [Heading(measure_title(measure, data), 3), _pair_table(pairs)]
+    return blocks
+
+
+def _pair_table(pairs: Sequence[Comparison]) -> Table:
+    columns = ("first", "second", "n", "medians", "difference", "A12", "p", "Holm", "")
+    return Table(
+        columns,
+        [
+            (
+                label(pair.a),
+                label(pair.b),
+                f"{pair.of_a.size}, {pair.of_b.size}",
+                f"{np.median(pair.of_a):.1f}, {np.median(pair.of_b):.1f}",
+                f"{pair.shift.value:z.1f} {between(pair.shift, '.1f')}",
+                f"{pair.a12.value:.2f} {between(pair.a12)}",
+                probability(pair.p).removeprefix("= "),
+                probability(pair.p_holm).removeprefix("= "),
+                PAIR_COLUMNS["stars"](pair),
+            )
+            for pair in pairs
+        ],
+        texts=2,
+    )
+
+
+def numbers(pair: Comparison) -> str:
+    """A pair of experiments in numbers."""
+    return (
+        f"medians {np.median(pair.of_a):.1f} and {np.median(pair.of_b):.1f}, "
+        f"difference {pair.shift.value:z.1f} {between(pair.shift, '.1f')}; "
+        f"A12 {pair.a12.value:.2f} {between(pair.a12)}; "
+        f"p {probability(pair.p)}, Holm {probability(pair.p_holm)}"
+    )
+
+
+def compared(pair: Comparison, a: str, b: str) -> str:
+    """What a pair of experiments shows, and no more; the better one comes first.
+
+    Args:
+        pair: the experiments.
+        a: name of the first for readers.
+        b: name of the second.
+    """
+    if pair.a12.value < 0.5:
+        pair, a, b = pair.turned(), b, a
+    found = f"{numbers(pair)}; n = {pair.of_a.size} and {pair.of_b.size}"
+    if not pair.enough:
+        return (
+            f"{a} and {b}: {found}. Fewer than {FEWEST_FOR_STARS} runs: "
+            "no verdict on which is better."
+        )
+    if not pair.decided:
+        return (
+            f"{a} and {b}: no difference is shown, which does not show that there is "
+            f"none: {found}."
+        )
+    return f"{a} beats {b} in {pair.a12.value:.0%} of the pairs of runs: {found}."

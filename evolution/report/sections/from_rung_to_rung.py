@@ -1,0 +1,39 @@
+"""From rung to rung: what champions keep of their fitness on another robot."""
+
+from evolution.pages.blocks import Block, Heading, Paragraph, Table
+from evolution.pages.words import NOTHING, label, robot_name, spread
+from evolution.report.samples import kept
+from evolution.statistics.estimates import FEWEST_FOR_RANKS, rank_correlation
+from evolution.study.data import StudyData
+
+
+def from_rung_to_rung_section(data: StudyData) -> list[Block]:
+    """How champions keep their fitness from robot to robot; nothing for one robot."""
+    if len(data.robots) < 2:
+        return []
+    first, last = data.robots[0], data.robots[-1]
+    rows = []
+    for name, runs in data.with_runs.items():
+        a, b = data.held_out(name, first), data.held_out(name, last)
+        rank = rank_correlation(a, b)
+        rows.append(
+            (
+                label(name),
+                str(len(runs)),
+                spread(a),
+                spread(b),
+                spread(kept(b, a), 100, ".0f"),
+                NOTHING if rank is None else f"{rank:.2f}",
+            )
+        )
+    one, other = robot_name(first), robot_name(last)
+    return [
+        Heading("From rung to rung"),
+        Paragraph(
+            f"Champions evolved on the {one}, tested on both from the same starts. "
+            f"Kept: fitness on the {other} in percent of that on the {one}, by run. "
+            "Rank correlation: Spearman's over runs, given from "
+            f"{FEWEST_FOR_RANKS} runs on."
+        ),
+        Table(("experiment", "n", one, other, "kept", "rank correlation"), rows),
+    ]

@@ -1,0 +1,79 @@
+"""Held-out fitness: the main table, and the same with noise."""
+
+import numpy as np
+
+from evolution.pages.blocks import Block, Heading, Paragraph, Table
+from evolution.pages.words import (
+    NOTHING,
+    SPREAD,
+    YARDSTICK_LABEL,
+    label,
+    percent,
+    percent_median,
+    robot_name,
+    spread,
+)
+from evolution.report.measures import shown_robots
+from evolution.report.samples import crash_rates, tests_of
+from evolution.study.data import StudyData
+
+
+def held_out_fitness_section(data: StudyData) -> list[Block]:
+    """The main table: held-out fitness first."""
+    robots = shown_robots(data)
+    rows = []
+    for name, runs in data.with_runs.items():
+        row = [label(name), str(len(runs))]
+        for robot in robots:
+            sample = data.held_out(name, robot)
+            crashes = crash_rates(tests_of(data, name, robot))
+            row += [spread(sample), f"{sample.max():.1f}", percent_median(crashes)]
+        rows.append([*row, spread(data.best_stored(name))])
+    if data.yardstick:
+        row = [YARDSTICK_LABEL, NOTHING]
+        for robot in robots:
+            test = data.yardstick[robot]
+            row += [f"{test.mean:.1f}", NOTHING, percent(test.crash_rate)]
+        rows.append([*row, NOTHING])
+    columns = ["experiment", "n"]
+    for robot in robots:
+        columns += [f"held-out, {robot_name(robot)}", "best run", "crashes"]
+    return [
+        Heading("Held-out fitness"),
+        Paragraph(
+            f"{SPREAD} of the champion's mean on the test starts, the best run, and "
+            "the median share of its trials that crash. Best stored is last: the "
+            "highest fitness that a run believed in, a mean of few trials that was "
+            "chosen for being high. It is what the paper reports, and seldom the "
+            "champion's."
+        ),
+        Table([*columns, "best stored"], rows),
+        *_as_evolved(data),
+    ]
+
+
+def _as_evolved(data: StudyData) -> list[Block]:
+    """Held-out fitness on disturbed robots, of experiments that evolved on such."""
+    rows = []
+    for name, runs in data.with_runs.items():
+        found = [run.scores.held_out_as_evolved for run in runs]
+        tests = [each for each in found if each]
+        if tests:
+            row = [label(name), str(len(tests))]
+            for robot in shown_robots(data):
+                on_robot = [each[robot] for each in tests]
+                row.append(spread(np.array([test.mean for test in on_robot])))
+                row.append(percent_median(crash_rates(on_robot)))
+            rows.append(row)
+    if not rows:
+        return []
+    columns = ["experiment", "n"]
+    for robot in shown_robots(data):
+        columns += [f"held-out, {robot_name(robot)}", "crashes"]
+    return [
+        Paragraph(
+            "The same with the disturbances that they evolved with: noise, and where "
+            "the config says so other robots."
+        ),
+        Table(columns, rows),
+    ]

@@ -1,0 +1,116 @@
+"""How to get every number again: files, commands, and where the runs came from."""
+
+import shlex
+from contextlib import suppress
+from typing import Any
+
+from epuck_mj.errors import UserError
+from epuck_mj.policies.wall_follower import YARDSTICK
+from evolution.pages.blocks import Block, Code, Heading, Listing, Paragraph, Table
+from evolution.pages.words import NOTHING, command_line, label
+from evolution.run.directory import RunDirectory
+from evolution.settings.config import differences
+from evolution.study.data import StudyData
+
+
+def commands(data: StudyData, output: str, ioh: bool) -> dict[str, str]:
+    """What to type to get every number again, by what it gives."""
+    study = data.path.as_posix()
+    run = next(run for runs in data.runs.values() for run in runs)
+    again = ["--ioh"] if ioh else []
+    return {
+        "this report": command_line(
+            "evolution.report", study, "--output", output, *again
+        ),
+        "held-out fitness and behaviour of every champion": command_line(
+            "evolution.evaluate", study
+        ),
+        "whether every champion scores the same on this machine": command_line(
+            "evolution.verify", study
+        ),
+        "the hand-written wall follower": command_line("evolution.evaluate", YARDSTICK),
+        "one run, byte for byte (any other likewise)": command_line(
+            "evolution.run",
+            RunDirectory(run.path).config.as_posix(),
+            "--output",
+            f"runs/again-{run.path.parent.name}-{run.seed}",
+        ),
+    }
+
+
+def origins(data: StudyData) -> dict[str, list[Any]]:
+    """Commits, versions, processors and arguments of all runs, each once, sorted."""
+    found: dict[str, set[Any]] = {key: set() for key in ORIGINS}
+    for runs in data.runs.values():
+        for run in runs:
+            try:
+                fields = RunDirectory(run.path).provenance_fields()
+            except UserError:
+                continue
+            for part in (fields, *fields.get("resumed", ())):
+                for key, read in ORIGINS.items():
+                    # what somebody has edited is left out
+                    with suppress(AttributeError, KeyError, TypeError):
+                        if part.get(key):
+                            found[key].add(read(part[key]))
+    return {key: sorted(values) for key, values in found.items()}
+
+
+ORIGINS = {
+    "git": lambda git: git["commit"] + (" and changes" if git["modified"] else ""),
+    "versions": lambda versions: ", ".join(f"{k} {v}" for k, v in versions.items()),
+    "processor": lambda processor: str(processor.get("model")),
+    "argv": lambda argv: shlex.join(argv),
+}
+"""Parts of a run's provenance that a report gives, and their texts."""
+
+
+def how_to_get_every_number_again_section(
+    data: StudyData, output: str, ioh: bool
+) -> list[Block]:
+    """Files, commands, and where the runs came from."""
+    came_from = origins(data)
+    blocks: list[Block] = [
+        Heading("How to get every number again"),
+        Listing(
+            [
+                "runs.csv: every run. Tables of this page are made of it, "
+                "pairwise.csv, success.csv and targets.csv; summary.json has all.",
+                *(["ioh/: the histories, for IOHanalyzer."] if ioh else []),
+                "Random numbers of intervals are drawn from a fixed seed: the same "
+                "study gives the same bytes.",
+            ]
+        ),
+    ]
+    for what, line in commands(data, output, ioh).items():
+        blocks += [Paragraph(f"{what[0].upper()}{what[1:]}:"), Code([line])]
+    blocks += [
+        Paragraph(
+            "The runs were begun with these arguments of python -m evolution.study or "
+            "evolution.run:"
+        ),
+        Code(came_from["argv"] or [NOTHING]),
+        Paragraph("Code, versions and processors of the runs:"),
+        Listing(
+            [
+                f"commit {NOTHING if not came_from['git'] else ''}"
+                + "; ".join(came_from["git"]),
+                *came_from["versions"],
+                *came_from["processor"],
+            ]
+        ),
+    ]
+    differing = differences(data.configs, ("seed",))
+    if differing:
+        names = list(data.configs)
+        blocks += [
+            Paragraph("The experiments differ in these keys:"),
+            Table(
+                ("key", *(label(name) for name in names)),
+                [
+                    (key, *(str(values.get(name, NOTHING)) for name in names))
+                    for key, values in differing.items()
+                ],
+            ),
+        ]
+    return blocks

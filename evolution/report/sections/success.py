@@ -1,0 +1,181 @@
+"""Success: in how many runs each experiment meets a criterion, and who in more."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
+from evolution.pages.words import YARDSTICK_LABEL, label, probability, robot_name
+from evolution.report.contests import Contest, contests
+from evolution.report.measures import shown_robots
+from evolution.report.samples import FOLLOWING
+from evolution.statistics.estimates import Interval, wilson
+from evolution.statistics.significance import FEWEST_FOR_STARS, LEVELS, fisher
+from evolution.study.data import RunData, StudyData
+
+MATCHES, FOLLOWS = "matches the hand-written follower", "follows walls"
+"""Criteria of success.
+
+The first asks for the yardstick's mean on the same starts: of one follower, which
+keeps 8 mm off the wall, where closer earns more. The second asks that at least
+`FOLLOWING` of the test trials are a wall follower's or a hugger's: the behaviour that
+the paper claims, whatever its fitness.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcomes:
+    """Runs that meet a criterion on a robot.
+
+    Attributes:
+        criterion: `MATCHES` or `FOLLOWS`.
+        robot: on which.
+        met: whether each run of an experiment meets it, `(runs,)`, by experiment.
+        pairs: the experiments against each other, by Fisher's exact test.
+    """
+
+    criterion: str
+    robot: str
+    met: Mapping[str, np.ndarray]
+    pairs: Sequence[Contest]
+
+    def share(self, name: str) -> Interval:
+        """Share of an experiment's runs, with Wilson's 95 % bounds."""
+        return wilson(int(self.met[name].sum()), self.met[name].size)
+
+
+def outcomes(data: StudyData) -> list[Outcomes]:
+    """What of each criterion and robot is known.
+
+    Without a yardstick there is no `MATCHES`, without behaviour classes no `FOLLOWS`.
+    """
+    found = []
+    for robot in shown_robots(data):
+        for criterion, meets in _criteria(data, robot).items():
+            met = {
+                name: np.array([meets(run) for run in runs])
+                for name, runs in data.with_runs.items()
+            }
+            pairs = contests(met, data.alike, _fisher_p)
+            found.append(Outcomes(criterion, robot, met, pairs))
+    # all of a criterion together
+    return sorted(found, key=lambda each: (MATCHES, FOLLOWS).index(each.criterion))
+
+
+def _fisher_p(a: np.ndarray, b: np.ndarray) -> float:
+    return fisher(int(a.sum()), a.size, int(b.sum()), b.size)
+
+
+def _criteria(data: StudyData, robot: str) -> dict[str, Callable[[RunData], bool]]:
+    """What the data can tell of each run on a robot."""
+    reference, found = data.yardstick_mean(robot), {}
+    if reference is not None:
+        found[MATCHES] = lambda run: run.held_out(robot) >= reference
+    everything = [run for runs in data.runs.values() for run in runs]
+    if all(run.scores.held_out[robot].behaviour for run in everything):
+        found[FOLLOWS] = lambda run: run.scores.held_out[robot].following >= FOLLOWING
+    return found
+
+
+SUCCESS_COLUMNS = (
+    *("criterion", "robot", "experiment", "successes", "n", "share", "low", "high"),
+    *("other", "other_successes", "other_n", "fisher_p", "fisher_p_holm", "family"),
+)
+"""Columns of success.csv; from `other` on they are of pairs only."""
+
+
+def success_rows(data: StudyData) -> list[dict[str, Any]]:
+    """For each criterion and robot, a row per experiment, then one per pair."""
+    rows = []
+    for each in outcomes(data):
+        alone = {name: _row(each, name) for name in each.met}
+        rows += alone.values()
+        rows += [
+            alone[pair.a]
+            | {
+                "other": pair.b,
+                "other_successes": int(pair.of_b.sum()),
+                "other_n": pair.of_b.size,
+                "fisher_p": pair.p,
+                "fisher_p_holm": pair.p_holm,
+                "family": pair.family,
+            }
+            for pair in each.pairs
+        ]
+    return rows
+
+
+def _row(found: Outcomes, name: str) -> dict[str, Any]:
+    met, share = found.met[name], found.share(name)
+    return dict.fromkeys(SUCCESS_COLUMNS) | {
+        "criterion": found.criterion,
+        "robot": found.robot,
+        "experiment": name,
+        "successes": int(met.sum()),
+        "n": met.size,
+        "share": share.value,
+        "low": share.low,
+        "high": share.high,
+    }
+
+
+def success_section(data: StudyData) -> list[Block]:
+    """Shares of runs that meet a criterion; nothing if the data have none."""
+    everything = outcomes(data)
+    blocks: list[Block] = [Heading("Success")]
+    meanings = {
+        MATCHES: f"held-out mean of at least the {YARDSTICK_LABEL}'s on the same "
+        "starts; it keeps 8 mm off the wall, and closer earns more",
+        FOLLOWS: f"at least {FOLLOWING:.0%} of the test trials are a wall follower's "
+        "or a hugger's",
+    }
+    for criterion, meaning in meanings.items():
+        found = [each for each in everything if each.criterion == criterion]
+        if not found:
+            absent = (
+                "the hand-written wall follower was not tested in the setting of all"
+                if criterion == MATCHES
+                else "not every run has behaviour classes"
+            )
+            blocks.append(Paragraph(f"A run {criterion}: not known, {absent}."))
+            continue
+        blocks += [
+            Paragraph(f"A run {criterion}: {meaning}. Share with Wilson 95 % bounds."),
+            _success_table(found),
+        ]
+        pairs = [(each.robot, pair) for each in found for pair in each.pairs]
+        if pairs:
+            (_, first), *_ = pairs
+            decided = [_fisher(robot, pair) for robot, pair in pairs if pair.decided]
+            blocks += [
+                Paragraph(
+                    f"Fisher's exact test of the {first.family} pairs of a robot, "
+                    "Holm-adjusted within them; pairs that differ with p < "
+                    f"{LEVELS[0]}, of {FEWEST_FOR_STARS} runs each at least (all: "
+                    "success.csv):"
+                ),
+                Listing(decided or ["none"]),
+            ]
+    return blocks
+
+
+def _fisher(robot: str, pair: Contest) -> str:
+    return (
+        f"{label(pair.a)} and {label(pair.b)}, {robot_name(robot)}: "
+        f"{pair.of_a.sum()} of {pair.of_a.size} and "
+        f"{pair.of_b.sum()} of {pair.of_b.size}, Holm p {probability(pair.p_holm)}"
+    )
+
+
+def _success_table(found: Sequence[Outcomes]) -> Table:
+    rows = []
+    for each in found:
+        for name, met in each.met.items():
+            share = each.share(name)
+            bounds = f"[{share.low:.0%}, {share.high:.0%}]"
+            runs = f"{met.sum()} of {met.size}"
+            shares = f"{share.value:.0%} {bounds}"
+            rows.append((label(name), robot_name(each.robot), runs, shares))
+    return Table(("experiment", "robot", "runs", "share"), rows, texts=2)

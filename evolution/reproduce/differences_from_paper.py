@@ -1,0 +1,77 @@
+"""What differs from the original: the paper beside the shipped experiments."""
+
+from evolution.pages.blocks import Block, Listing, Paragraph, Table
+from evolution.reproduce.claims import PAPER, unlike
+from evolution.study.config import StudyConfig, find_study
+from evolution.study.data import StudyData
+
+DIFFERENCES = (
+    ("simulator", "Player/Stage, 2D", "MuJoCo, 3D; planar robot, tested on wheels"),
+    ("drive", "not said", "wheels follow a command with a time constant of 15 ms"),
+    ("steps of a trial", "not legible", "{base.steps} of {base.control_step} s"),
+    ("arena", "square, as in their laboratory", "1.0 m square"),
+    (
+        "speeds",
+        "not said",
+        "{base.v_max:.4g} m/s and {base.w_max:.4g} rad/s, the hardware's limits",
+    ),
+    (
+        "sensors",
+        "0 near to 1 free, 4 cm",
+        "the same, linear along eight rays at the angles Player has, without noise",
+    ),
+    (
+        "crash",
+        "not said what counts",
+        "the shell touches a wall at the end of a control step",
+    ),
+    (
+        "fitness",
+        "equation (2), which as printed rewards circles in the open",
+        "its prose: fast, straight and near a wall, multiplied",
+    ),
+    ("weights", "range not said", "within +-{base.weight_bound}, no biases"),
+    ("first weights", "random", "uniform within +-{base.weight_init}"),
+    (
+        "DE outside the bounds",
+        "not said",
+        "{best.bounds_rule} between parent and bound",
+    ),
+    ("DE's r1, r2, r3", "random", "unlike each other and the parent"),
+    (
+        "GA",
+        "binary; tournament size not legible, operators not said",
+        "{ga.bits} bits a weight, tournament of {ga.tournament}, one-point crossover, "
+        "{ga.elites} elites",
+    ),
+    (
+        "budget",
+        '"until an optimal level is reached"; 30,000 evaluations, though the 250 '
+        "generations of DE/best are 37,500",
+        "{base.evaluations:,} evaluations for every algorithm; 37,500 were not run",
+    ),
+    (
+        "starts",
+        "random",
+        "fresh for every generation, the same for all its individuals",
+    ),
+    ("replicates", '"at least three"', "n as stated beside each number"),
+    ("the best", "highest stored fitness", "chosen on 200 starts, reported on 1,000"),
+    ("robot", "a physical e-puck", "none"),
+)
+"""Each difference: its name, the paper, and the shipped experiments."""
+
+
+def differences_from_paper(study: StudyData) -> list[Block]:
+    """A table of the differences, and in what a study differs from the shipped one."""
+    shipped = StudyConfig.load(find_study(PAPER)).experiments
+    best, ga = shipped["de-best"], shipped["ga"]
+    values = {"base": best, "best": best.optimizer, "ga": ga.optimizer}
+    rows = [[what, paper, here.format(**values)] for what, paper, here in DIFFERENCES]
+    blocks: list[Block] = [Table(["", "paper", "shipped experiments"], rows, texts=3)]
+    if further := unlike(study):
+        blocks += [
+            Paragraph("The experiments of this study differ from the shipped ones in"),
+            Listing(further),
+        ]
+    return blocks
