@@ -7,6 +7,8 @@ import sys
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parent.parent
 MODULES = sorted([*ROOT.glob("epuck_mj/**/*.py"), *ROOT.glob("evolution/**/*.py")])
 
@@ -159,6 +161,34 @@ def test_no_imports_in_circles():
     }
     # raises if there is one
     TopologicalSorter(uses).prepare()
+
+
+COMMANDS = sorted(
+    name
+    for path, name in ((path, module_of(path)) for path in MODULES)
+    if '__name__ == "__main__"' in path.read_text()
+)
+
+
+@pytest.mark.parametrize(
+    ("modules", "absent"),
+    [
+        (
+            ["epuck_mj", "epuck_mj.constants", "epuck_mj.bridge.language.protocol"],
+            {*OUTSIDE, "xml"},
+        ),
+        (COMMANDS, OUTSIDE - {"pydantic", "tqdm", "tyro", "yaml", "serial"}),
+    ],
+)
+def test_starting_loads_what_is_used(modules, absent):
+    """No physics and no pictures before a command has read its arguments."""
+    code = (
+        "import importlib, sys\n"
+        f"for name in {modules}: importlib.import_module(name)\n"
+        f"print(*sorted({absent} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.stdout.strip(), done.stderr) == ("", "")
 
 
 def test_nothing_here_draws():

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -400,6 +401,37 @@ def test_what_is_nobodys_to_put_right_leaves_a_log(here):
     assert message == f"ValueError: this and that (see {log})"
     assert log.read_text().startswith("Traceback")
     assert 'raise ValueError("this' in log.read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("killed", [False, True])
+def test_a_worker_does_one_run_after_the_other(here, monkeypatch, killed):
+    write_study(here)
+    workers: list[Any] = []
+    worker = jobs._Worker
+    monkeypatch.setattr(
+        jobs, "_Worker", lambda means: workers.append(worker(means)) or workers[-1]
+    )
+    # runs that fail at once leave their worker as warm as others do
+    config = load_config(here / "one.yaml").model_copy(update={"arena": "nowhere"})
+    todo = [
+        Job("one", config.model_copy(update={"seed": s}), here / f"{s}", ())
+        for s in (1, 2, 3)
+    ]
+    failures = []
+    for event in jobs.carry_out_side_by_side(todo, Means(threads=1), 1):
+        assert event.ended
+        assert event.failure is not None
+        failures.append(event.failure)
+        if killed and len(failures) == 1:
+            # while it has nothing to do
+            workers[0].process.kill()
+            workers[0].process.join()
+    ours, death = "no arena 'nowhere'", "its process was killed by SIGKILL"
+    expected = (ours, death if killed else ours, ours)
+    assert all(map(str.startswith, failures, expected))
+    assert len(workers) == 1 + killed
+    assert all(each.process.exitcode is not None for each in workers)
 
 
 @linux
