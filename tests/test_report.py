@@ -34,8 +34,8 @@ from evolution.pages.blocks import (
 from evolution.pages.csv_text import csv_text
 from evolution.pages.words import spread
 from evolution.report.__main__ import report_study
-from evolution.report.folder import tables
 from evolution.report.measures import BEST_STORED
+from evolution.report.report_folder import tables
 from evolution.report.run_table import run_rows
 from evolution.report.samples import TARGET_SHARES
 from evolution.report.sections.comparisons import (

@@ -36,7 +36,7 @@ def report_study(argv: Sequence[str]) -> int:
     """
     options = parse(ReportOptions, "python -m evolution.report", argv)
     # slow to import
-    from evolution.report.folder import write_report
+    from evolution.report.report_folder import write_report
 
     output = options.output or options.study / "report"
     for line in write_report(options.study, output, options.ioh):
