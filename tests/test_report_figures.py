@@ -359,9 +359,8 @@ def test_every_study_has_its_figures(n_runs, robots, yardstick, monkeypatch):
         "evolution.report.figures.STUDY_FIGURES",
         {name: draw for name, draw in STUDY_FIGURES.items() if name != "trajectories"},
     )
-    found = {
-        name: caption for name, _, caption in drawn_figures(a_study(n_runs, robots))
-    }
+    data = a_study(n_runs, robots, yardstick)
+    found = {name: caption for name, _, caption in drawn_figures(data)}
     left_out = {"trajectories"} | ({"rungs"} if len(robots) < 2 else set())
     own = [f"fitness-{name}" for name, n in n_runs.items() if n]
     assert list(found) == own + [name for name in STUDY_FIGURES if name not in left_out]
@@ -380,12 +379,11 @@ def test_no_behaviour_in_older_runs(data):
 def test_one_generation_is_enough(tmp_path):
     run = a_run("ga", 1, evaluations=100)
     data = replace(a_study({"ga": 1}), runs={"ga": (run,)})
-    for figure, _ in (
-        growth_figure(data, "ga"),
-        growths_figure(data),
-        targets_figure(data),
-    ):
+    growth = growth_figure(data, "ga")
+    for figure, caption in (growth, growths_figure(data), targets_figure(data)):
         write_figure(figure, tmp_path, "short")
+        assert imread(tmp_path / "short.png").shape[1] == 700
+        assert "n = 1" in caption
 
 
 def test_files_are_repeatable_small_and_sound(tmp_path):

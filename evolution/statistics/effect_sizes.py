@@ -93,7 +93,7 @@ def _root(function: Callable[[float], float], low: float, high: float) -> float:
 
 
 def _wins(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Of each pair `(..., n, m)`: 1 if the first is greater, 0.5 if they tie."""
+    """Wins of each pair `(..., n, m)`: 1 if the first is greater, 0.5 if they tie."""
     a, b = np.asarray(a, float)[..., :, None], np.asarray(b, float)[..., None, :]
     if not (a.size and b.size and np.isfinite(a).all() and np.isfinite(b).all()):
         raise ValueError("expected samples of finite values, got none or others")
