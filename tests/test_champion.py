@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from epuck_mj.host import files
-from epuck_mj.policies import file as controller_file
-from epuck_mj.policies.file import Origin
+from epuck_mj.policies.file import Origin, load_controller
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.step.control import control_step
 from epuck_mj.step.sensors import observe
@@ -249,7 +248,7 @@ def written(tmp_path_factory):
 def test_the_champion_file_loads_and_acts_bit_for_bit(written):
     experiment, directory = written
     champion = choose_champion(experiment.engine, experiment)
-    stored = controller_file.load(directory.champion)
+    stored = load_controller(directory.champion)
     assert stored.genome.tobytes() == champion.genome.tobytes()
     assert stored.network == experiment.config.network
     observation = np.random.default_rng(3).random((100, 8))
@@ -263,7 +262,7 @@ def test_the_champion_file_loads_and_acts_bit_for_bit(written):
 def test_the_champion_file_holds_every_score(written):
     experiment, directory = written
     champion = choose_champion(experiment.engine, experiment)
-    stored = controller_file.load(directory.champion)
+    stored = load_controller(directory.champion)
     policy = experiment.config.network.decode(champion.genome)
     tests = {
         robot: judge.test(policy)
@@ -297,7 +296,7 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
     list(experiment.run())
     directory = RunDirectory(tmp_path)
     scores = write_results(experiment, judges_of(config), directory, threads=1)
-    stored = controller_file.load(directory.champion)
+    stored = load_controller(directory.champion)
     assert Scores.read(stored.scores, directory.champion) == scores
     found = scores.held_out_as_evolved
     assert list(found) == list(scores.held_out) == ["epuck_planar", "epuck"]
@@ -313,7 +312,7 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
 
 def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
     _, directory = written
-    stored = controller_file.load(directory.champion).scores
+    stored = load_controller(directory.champion).scores
     scores = Scores.read(stored, directory.champion)
     fresh, believed = scores.in_lines(20).splitlines()
     parts = []
@@ -340,7 +339,7 @@ def test_a_run_on_the_wheeled_robot_is_tested_on_the_plane_as_well(
     directory = RunDirectory(tmp_path)
     scores = write_results(experiment, judges_of(experiment.config), directory)
     assert list(scores.held_out) == ["epuck", "epuck_planar"]
-    written = controller_file.load(directory.champion)
+    written = load_controller(directory.champion)
     assert directory.champion.read_text(encoding="utf-8") == written.to_json()
     assert len(scores.in_lines(10).splitlines()) == 2
 

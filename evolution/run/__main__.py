@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import tyro
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import check_threads, command, main, parse
+from epuck_mj.host.command_line import check_threads, main, parse, shell_command
 from epuck_mj.host.interruption import Interrupted, Interruption
 from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
@@ -58,7 +58,7 @@ class Options:
     print_config: bool = False
 
 
-def run(argv: Sequence[str]) -> int:
+def evolve(argv: Sequence[str]) -> int:
     """Run the command line; its exit status.
 
     Raises:
@@ -118,9 +118,8 @@ def _options(argv: Sequence[str]) -> Options:
     default = Options(experiment, config)
     options = parse(Options, f"python -m {MODULE}", argv, default)
     if options.experiment != experiment:
-        raise UserError(
-            f"the experiment comes first: {command(MODULE, options.experiment, '...')}"
-        )
+        first = shell_command(MODULE, options.experiment, "...")
+        raise UserError(f"the experiment comes first: {first}")
     # a run can be resumed from anywhere
     options = replace(options, config=options.config.located())
     if options.resume is not None and options.output is not None:
@@ -139,7 +138,7 @@ def _carry_out(evolution: "Run", live: bool) -> int:
         except Interrupted:
             print(
                 f"Interrupted after {directory.evaluations():,} evaluations; go on "
-                f"with: {command(MODULE, '--resume', directory.path)}",
+                f"with: {shell_command(MODULE, '--resume', directory.path)}",
                 file=sys.stderr,
             )
             return interruption.status
@@ -175,8 +174,8 @@ def _finished(evolution: "Run", live: bool) -> Scores:
 
 
 def _replay(directory: RunDirectory) -> str:
-    return f"Replay: {command('evolution.replay', directory.path)}"
+    return f"Replay: {shell_command('evolution.replay', directory.path)}"
 
 
 if __name__ == "__main__":
-    main(run)
+    main(evolve)

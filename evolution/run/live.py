@@ -18,7 +18,7 @@ from typing import Any, Self
 import numpy as np
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import command
+from epuck_mj.host.command_line import shell_command
 from epuck_mj.host.interruption import deaf_to_interrupts
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace
@@ -104,7 +104,7 @@ def require_viewer() -> None:
     if not viewer_there(PORT):
         raise UserError(
             f"no rerun viewer at {HOST}:{PORT} for --live; start one first: "
-            + command("rerun")
+            + shell_command("rerun")
         )
 
 
