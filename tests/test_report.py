@@ -33,8 +33,9 @@ from evolution.pages.blocks import (
 )
 from evolution.pages.csv_text import csv_text
 from evolution.pages.words import spread
-from evolution.report.__main__ import report_study, tables
+from evolution.report.__main__ import report_study
 from evolution.report.measures import BEST_STORED
+from evolution.report.report_folder import tables
 from evolution.report.run_table import run_rows
 from evolution.report.samples import TARGET_SHARES
 from evolution.report.sections.comparisons import (
@@ -42,7 +43,7 @@ from evolution.report.sections.comparisons import (
     comparisons,
     comparisons_of,
 )
-from evolution.report.sections.cost_of_targets import target_rows
+from evolution.report.sections.cost_of_targets import target_costs
 from evolution.report.sections.held_out_fitness import held_out_fitness_section
 from evolution.report.sections.success import FOLLOWS, MATCHES, outcomes
 from evolution.report.sections.what_stored_fitness_promised import (
@@ -544,7 +545,8 @@ def test_bad_input_is_one_line(kind, tmp_path):
 
 
 def test_target_and_run_rows_follow_the_study_order(large):
-    assert list(dict.fromkeys(row.experiment for row in target_rows(large))) == [*NAMES]
+    costs = target_costs(large)
+    assert list(dict.fromkeys(cost.experiment for cost in costs)) == [*NAMES]
     assert list(dict.fromkeys(row["experiment"] for row in run_rows(large))) == [*NAMES]
 
 

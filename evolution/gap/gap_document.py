@@ -16,26 +16,12 @@ from evolution.gap.transfer import (
 from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
 
 COLUMNS = (
-    "experiment",
-    "policy",
-    "fitness at home",
-    "kept, mean",
-    "kept, median",
-    "collisions per minute",
-    "worlds mastered",
+    *("experiment", "policy", "fitness at home", "kept, mean", "kept, median"),
+    *("collisions per minute", "worlds mastered"),
 )
-
-
 GROUP_COLUMNS = (
-    "experiment",
-    "full speed",
-    "robot",
-    "n",
-    "fitness at home",
-    "kept",
-    "collisions per minute",
-    "worlds mastered",
-    "against home",
+    *("experiment", "full speed", "robot", "n", "fitness at home", "kept"),
+    *("collisions per minute", "worlds mastered", "against home"),
 )
 
 

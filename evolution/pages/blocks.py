@@ -6,8 +6,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from markdown_it import MarkdownIt
-
 FIGURES_FOLDER = "figures"
 """Folder of the pictures, beside the Markdown file."""
 
@@ -135,6 +133,8 @@ def to_html(title: str, blocks: Sequence[Block]) -> str:
         title: of the window.
         blocks: what it shows, made from their Markdown but for the pictures.
     """
+    from markdown_it import MarkdownIt
+
     markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
     body = "".join(
         _figure(each) if isinstance(each, Picture) else markdown.render(_markdown(each))

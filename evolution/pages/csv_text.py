@@ -2,20 +2,19 @@
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 
-def csv_text(columns: Sequence[str], rows: Iterable[Any]) -> str:
+def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
     """The text of a CSV file with exact floats; None is an empty cell.
 
     Args:
         columns: names, in order.
-        rows: mappings or dataclasses.
+        rows: values by column.
     """
     text = io.StringIO()
     writer = csv.DictWriter(text, columns, lineterminator="\n")
     writer.writeheader()
-    writer.writerows(row if isinstance(row, dict) else asdict(row) for row in rows)
+    writer.writerows(rows)
     return text.getvalue()

@@ -13,16 +13,18 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import tyro
-from rerun.experimental import ViewerClient
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse
 from epuck_mj.host.files import write_bytes, writing
 from evolution.replay.viewer import viewer_binary
 from evolution.replay.web import free_ports
+
+if TYPE_CHECKING:
+    from rerun.experimental import ViewerClient
 
 VIEWER_PATIENCE = 60.0
 """How long the viewer may take to do what it is asked for [s]."""
@@ -48,12 +50,14 @@ class ViewerPictureOptions:
 
 
 @contextmanager
-def headless_viewer(recording: Path, size: tuple[int, int]) -> Iterator[ViewerClient]:
+def headless_viewer(recording: Path, size: tuple[int, int]) -> Iterator["ViewerClient"]:
     """A viewer without a window that has loaded a recording.
 
     Raises:
         UserError: if it does not start, as without a Vulkan driver.
     """
+    from rerun.experimental import ViewerClient
+
     (port,) = free_ports(1)
     with tempfile.TemporaryDirectory() as home:
         process = subprocess.Popen(
@@ -73,7 +77,7 @@ def headless_viewer(recording: Path, size: tuple[int, int]) -> Iterator[ViewerCl
             stderr=subprocess.DEVNULL,
         )
 
-        def connected() -> ViewerClient | None:
+        def connected() -> "ViewerClient | None":
             if process.poll() is not None:
                 raise UserError(
                     f"the rerun viewer ended with status {process.returncode}: "
@@ -96,7 +100,7 @@ def headless_viewer(recording: Path, size: tuple[int, int]) -> Iterator[ViewerCl
             process.wait()
 
 
-def viewer_screenshot(client: ViewerClient, time: float) -> bytes:
+def viewer_screenshot(client: "ViewerClient", time: float) -> bytes:
     """What the viewer shows at a time of the trial [s], once it has settled, as PNG."""
     client.set_time("sim_time", duration=time, play_state="paused")
     shots = [client.take_screenshot()]

@@ -2,25 +2,12 @@
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
 
-from epuck_mj.errors import UserError
-from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse
-from epuck_mj.policies.wall_follower import YARDSTICK
-from evolution.pages.blocks import FIGURES_FOLDER, Picture, to_html, to_markdown
-from evolution.pages.csv_text import csv_text
-from evolution.report.ioh import export_histories
-from evolution.report.page import report_blocks
-from evolution.report.run_table import run_rows
-from evolution.report.sections.comparisons import PAIR_COLUMNS, pair_rows
-from evolution.report.sections.cost_of_targets import TargetRow, target_rows
-from evolution.report.sections.success import SUCCESS_COLUMNS, success_rows
-from evolution.report.summary_json import summary_fields, summary_text
-from evolution.study.data import StudyData, load_study
 
 
 @dataclass(frozen=True)
@@ -48,66 +35,14 @@ def report_study(argv: Sequence[str]) -> int:
         UserError: for anything the user can put right.
     """
     options = parse(ReportOptions, "python -m evolution.report", argv)
-    data = load_study(options.study)
+    # slow to import
+    from evolution.report.report_folder import write_report
+
     output = options.output or options.study / "report"
-    with files.writing():
-        (output / FIGURES_FOLDER).mkdir(parents=True, exist_ok=True)
-        pictures, lacking = draw_figures(data, output)
-        if not data.yardstick:
-            where = "not tested in the setting of all"
-            lacking.append(f"{YARDSTICK}: {where}, nothing can be held against it")
-        data = replace(data, missing=(*data.missing, *lacking))
-        for name, text in tables(data).items():
-            files.write_text(output / name, text)
-        found = summary_fields(data, output.as_posix(), options.ioh)
-        files.write_text(output / "summary.json", summary_text(found))
-        blocks = report_blocks(data, pictures, output.as_posix(), options.ioh)
-        files.write_text(output / "report.md", to_markdown(blocks))
-        title = f"Report of {data.path.as_posix()}"
-        files.write_text(output / "report.html", to_html(title, blocks))
-        if options.ioh:
-            export_histories(data, output / "ioh")
-    for line in data.missing:
+    for line in write_report(options.study, output, options.ioh):
         print(f"missing: {line}", file=sys.stderr)
     print(f"Report: {output / 'report.html'} and {output / 'report.md'}")
     return 0
-
-
-def tables(data: StudyData) -> dict[str, str]:
-    """Texts of the CSV files by name."""
-    runs = run_rows(data)
-    return {
-        "runs.csv": csv_text(list(runs[0]), runs),
-        "pairwise.csv": csv_text(["measure", *PAIR_COLUMNS], pair_rows(data)),
-        "success.csv": csv_text(SUCCESS_COLUMNS, success_rows(data)),
-        "targets.csv": csv_text(
-            [field.name for field in fields(TargetRow)], target_rows(data)
-        ),
-    }
-
-
-def draw_figures(data: StudyData, output: Path) -> tuple[dict[str, Picture], list[str]]:
-    """Write the figures; each by name, and why others could not be drawn.
-
-    Raises:
-        UserError: if one cannot be written.
-    """
-    from evolution.pages.figure_files import write_figure
-    from evolution.report.figures import drawn_figures
-
-    folder = output / FIGURES_FOLDER
-    found: dict[str, Picture] = {}
-    drawn = drawn_figures(data)
-    while True:
-        try:
-            name, figure, caption = next(drawn)
-        except StopIteration:
-            return found, []
-        except UserError as error:
-            # the arena of another machine; all else can be shown
-            return found, [f"not all figures could be drawn: {error}"]
-        write_figure(figure, folder, name)
-        found[name] = Picture(name, caption, (folder / f"{name}.svg").read_bytes())
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from evolution.judging.scores import HeldOut
 from evolution.statistics.targets import evaluations_to_target
 from evolution.study.data import RunData, StudyData
 
-FOLLOWING = 0.9
+FOLLOWED = 0.9
 """Least share of a champion's trials that follow a wall without crashing."""
 
 TARGET_SHARES: tuple[float, ...] = tuple(
@@ -60,7 +60,7 @@ def kept(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
     return part[some] / whole[some]
 
 
-def disturbed(data: StudyData, name: str) -> bool:
+def with_noise(data: StudyData, name: str) -> bool:
     """Whether an experiment evolved on robots with noise."""
     return data.configs[name].noise != "none"
 
@@ -68,18 +68,18 @@ def disturbed(data: StudyData, name: str) -> bool:
 def like_for_like(data: StudyData, name: str) -> np.ndarray:
     """Held-out fitness of champions as they evolved, `(n,)`; nan if not tested so."""
     robot = data.robots[0]
-    if not disturbed(data, name):
+    if not with_noise(data, name):
         return data.held_out(name, robot)
     return np.array([run.held_out_as_evolved(robot) for run in data.runs[name]])
 
 
-def most_believed(data: StudyData, name: str) -> tuple[np.ndarray, np.ndarray]:
+def most_believed_fitness(data: StudyData, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Stored and held-out fitness of each run's most believed individual, `(n,)`.
 
     Held-out on the robot evolved on; of the runs that say. None say of experiments with
     noise: theirs was tested on ideal robots only.
     """
-    if disturbed(data, name):
+    if with_noise(data, name):
         return np.empty(0), np.empty(0)
     found = [run.scores.most_believed for run in data.runs[name]]
     pairs = [(each.stored, each.held_out) for each in found if each]

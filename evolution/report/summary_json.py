@@ -3,7 +3,6 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -16,10 +15,10 @@ from evolution.report.samples import (
     class_means,
     clearances,
     crash_rates,
-    disturbed,
     kept,
-    most_believed,
+    most_believed_fitness,
     tests_of,
+    with_noise,
 )
 from evolution.report.sections.comparisons import pair_rows
 from evolution.report.sections.cost_of_targets import target_rows
@@ -53,7 +52,7 @@ def summary_fields(data: StudyData, output: str, ioh: bool) -> dict[str, Any]:
             "runs": run_rows(data),
             "pairwise": pair_rows(data),
             "success": success_rows(data),
-            "targets": [asdict(row) for row in target_rows(data)],
+            "targets": target_rows(data),
             "provenance": origins(data),
             "commands": commands(data, output, ioh),
         }
@@ -75,6 +74,7 @@ def _experiment(data: StudyData, name: str) -> dict[str, Any]:
         return found
     first, last = data.robots[0], data.robots[-1]
     stored, evolved_on = data.stored(name), data.held_out(name, first)
+    believed, worth = most_believed_fitness(data, name)
     rank = rank_correlation(evolved_on, data.held_out(name, last))
     return found | {
         "held_out": {
@@ -83,7 +83,7 @@ def _experiment(data: StudyData, name: str) -> dict[str, Any]:
                 "crash_rate": _described(crash_rates(tests_of(data, name, robot))),
                 # of experiments with noise, stored fitness is another quantity
                 "share_of_stored": None
-                if disturbed(data, name)
+                if with_noise(data, name)
                 else _described(kept(data.held_out(name, robot), stored)),
                 "behaviour": class_means(data, name, robot),
                 "clearance": _described(clearances(data, name, robot)),
@@ -92,13 +92,10 @@ def _experiment(data: StudyData, name: str) -> dict[str, Any]:
             for robot in shown_robots(data)
         },
         "stored": _described(stored),
-        "most_believed": dict(
-            zip(
-                ("stored", "held_out"),
-                map(_described, most_believed(data, name)),
-                strict=True,
-            )
-        ),
+        "most_believed": {
+            "stored": _described(believed),
+            "held_out": _described(worth),
+        },
         "share_kept_between_robots": _described(
             kept(data.held_out(name, last), evolved_on)
         ),

@@ -13,10 +13,7 @@ from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse, shell_command
 from epuck_mj.step.fitness import STEP_FITNESS
 from evolution.report.__main__ import report_study
-from evolution.reproduce.first_generation import first_generation
-from evolution.reproduce.reproduction import reproduction
 from evolution.study.__main__ import study
-from evolution.study.data import load_study
 
 QUICK = (("quick", "1-3"),)
 FULL = (("paper", "1-30"), ("wheels", "1-3"))
@@ -74,6 +71,11 @@ def reproduce_paper(argv: Sequence[str]) -> int:
                 return status
             failed = max(failed, status)
             places.append(place)
+    # slow to import
+    from evolution.reproduce.first_generation import first_generation
+    from evolution.reproduce.reproduction import reproduction
+    from evolution.study.data import load_study
+
     studies = [load_study(place) for place in filter(None, places)]
     for place in filter(None, places):
         report_study(

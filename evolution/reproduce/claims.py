@@ -9,7 +9,7 @@ import numpy as np
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.pages.words import PAPERS, label, median_and_quartiles
 from evolution.report.measures import held_out_measure, measures
-from evolution.report.samples import FOLLOWING, known
+from evolution.report.samples import FOLLOWED, known
 from evolution.report.sections.comparisons import (
     Comparison,
     comparisons_of,
@@ -215,14 +215,17 @@ def _follows(study: StudyData, name: str) -> Claim:
     """Finds a wall, follows it, does not crash: on wheels."""
     text = (
         f"{label(name)}'s champion finds a wall and follows it without crashing "
-        f"(read as: {FOLLOWING:.0%} of its trials on {WHEELED_ROBOT} are a wall "
+        f"(read as: {FOLLOWED:.0%} of its trials on {WHEELED_ROBOT} are a wall "
         "follower's or a hugger's)"
     )
     runs = study.runs.get(name, ())
     tests = [run.scores.held_out[WHEELED_ROBOT] for run in runs]
     sample = 100 * known([test.following for test in tests])
     return _claim(
-        text, sample, lambda: of_most(sample >= 100 * FOLLOWING), "share of trials"
+        text,
+        sample,
+        lambda: of_most(sample >= 100 * FOLLOWED),
+        "share of trials",
     )
 
 

@@ -12,11 +12,8 @@ from pathlib import Path
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse
-from evolution.pages.blocks import to_markdown
 from evolution.reproduce.__main__ import reproduce_paper
-from evolution.reproduce.reproduction import runs_table
 from evolution.run.directory import RunDirectory
-from evolution.study.data import load_study
 from evolution.study.directory import StudyDirectory
 
 REPORTED = ("paper", "wheels")
@@ -98,6 +95,11 @@ def with_tables(text: str, results: Path) -> str:
     Raises:
         UserError: if a marker is missing.
     """
+    # slow to import
+    from evolution.pages.blocks import to_markdown
+    from evolution.reproduce.reproduction import runs_table
+    from evolution.study.data import load_study
+
     tables = {
         path.name: to_markdown([runs_table(load_study(path))])
         for path in shipped(results)

@@ -14,7 +14,7 @@ from evolution.pages.blocks import (
 )
 from evolution.pages.words import SPREAD, label, median_and_quartiles, spread
 from evolution.report.measures import shown_robots
-from evolution.report.samples import kept, most_believed
+from evolution.report.samples import kept, most_believed_fitness
 from evolution.reproduce.claims import (
     REPLICATES,
     Claim,
@@ -151,7 +151,7 @@ def _hidden(study: StudyData) -> list[Block]:
     """What whoever trusts stored fitness would have taken home."""
     robot, rows = study.robots[0], []
     for name, runs in study.runs.items():
-        stored, held_out = most_believed(study, name)
+        stored, held_out = most_believed_fitness(study, name)
         if stored.size:
             rows.append(
                 [
@@ -172,13 +172,8 @@ def _hidden(study: StudyData) -> list[Block]:
         ),
         Table(
             [
-                "algorithm",
-                "n",
-                "highest stored",
-                "its held-out",
-                "worst run",
-                "champion's stored",
-                "champion's held-out",
+                *("algorithm", "n", "highest stored", "its held-out", "worst run"),
+                *("champion's stored", "champion's held-out"),
             ],
             rows,
         ),

@@ -22,7 +22,7 @@ from evolution.pages.style import (
     with_count,
 )
 from evolution.pages.words import YARDSTICK_LABEL, robot_name
-from evolution.report.samples import disturbed
+from evolution.report.samples import with_noise
 from evolution.statistics.estimates import quartiles
 from evolution.study.data import StudyData
 
@@ -69,7 +69,7 @@ def stored_and_held_out_figure(data: StudyData) -> tuple[Figure, str]:
         "to the filled mark, the robot it evolved on, is the luck that it kept. "
         f"{CHAMPION}"
     )
-    if any(disturbed(data, name) for name in runs):
+    if any(with_noise(data, name) for name in runs):
         caption += (
             " Of experiments that evolved with noise the distance is more than luck: "
             "the dots are of ideal robots."

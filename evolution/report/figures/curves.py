@@ -58,11 +58,16 @@ def common_grid(runs: Sequence[RunData]) -> np.ndarray:
     return grid[np.round(thinned).astype(int)]
 
 
-def curves(runs: Sequence[RunData], column: str, grid: np.ndarray) -> np.ndarray:
-    """A column of the history of each run at `grid`, `(runs, grid)`."""
-    return np.array(
-        [on_grid(run.history["evaluations"], run.history[column], grid) for run in runs]
-    )
+def curves(
+    runs: Sequence[RunData], column: str, grid: np.ndarray, so_far: bool = False
+) -> np.ndarray:
+    """A column of the history of each run at `grid`, or its highest until then."""
+    found = []
+    for run in runs:
+        values = run.history[column]
+        values = np.maximum.accumulate(values) if so_far else values
+        found.append(on_grid(run.history["evaluations"], values, grid))
+    return np.array(found)
 
 
 @matplotlib.rc_context(PRINT)
@@ -109,16 +114,7 @@ def growths_figure(data: StudyData) -> tuple[Figure, str]:
     lines, styles, runs, last = {}, looks(data), data.with_runs, 0.0
     for i, (name, each) in enumerate(runs.items()):
         grid = common_grid(each)
-        best = np.array(
-            [
-                on_grid(
-                    run.history["evaluations"],
-                    np.maximum.accumulate(run.history["best"]),
-                    grid,
-                )
-                for run in each
-            ]
-        )
+        best = curves(each, "best", grid, so_far=True)
         line = _median_and_band(axes, grid, best, styles[name].color)
         _mark(line, styles[name], grid.size, i, len(runs))
         lines[with_count(name, len(each))] = line

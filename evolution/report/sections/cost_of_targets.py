@@ -1,6 +1,8 @@
 """Cost of targets: how many evaluations each experiment needs for each fitness."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -8,71 +10,76 @@ from evolution.pages.blocks import Block, Heading, Paragraph, Table
 from evolution.pages.words import evaluations, label
 from evolution.report.measures import generator
 from evolution.report.samples import TARGET_SHARES, hits
+from evolution.statistics.estimates import Interval
 from evolution.statistics.targets import expected_running_time_interval
 from evolution.study.data import StudyData
 
 
-@dataclass(frozen=True)
-class TargetRow:
+@dataclass(frozen=True, eq=False)
+class TargetCost:
     """What a target cost an experiment.
 
     Attributes:
         experiment: its name.
-        target: fitness to reach.
-        share: the same, of the highest fitness there is.
-        fitness: which fitness: always the stored one, since a history has no other.
-        hits: runs that reached it.
-        n: runs.
-        expected_running_time: evaluations per success, inf if no run reached it.
-        expected_running_time_low: bootstrap 95 % bound, nan below 5 runs.
-        expected_running_time_high: likewise.
-        median_evaluations: of the runs that reached it, None if none did.
+        target: fitness to reach: the stored one, since a history has no other.
+        share: target as a share of the highest fitness there is.
+        hits: evaluations until each run reached it, `(runs,)`; nan: never.
+        time: expected running time in evaluations, inf if no run reached it.
     """
 
     experiment: str
     target: float
     share: float
-    fitness: str
-    hits: int
-    n: int
-    expected_running_time: float
-    expected_running_time_low: float
-    expected_running_time_high: float
-    median_evaluations: float | None
+    hits: np.ndarray
+    time: Interval
+
+    @property
+    def reached(self) -> np.ndarray:
+        """Evaluations of the runs that reached it, `(n,)`."""
+        return self.hits[~np.isnan(self.hits)]
 
 
-def target_rows(data: StudyData) -> list[TargetRow]:
-    """A row per experiment with runs and target."""
-    rows = []
+def target_costs(data: StudyData) -> list[TargetCost]:
+    """The cost of each target to each experiment with runs."""
+    found = []
     for name, runs in data.with_runs.items():
         spent = np.array([run.history["evaluations"][-1] for run in runs])
         for share, hit in zip(TARGET_SHARES, hits(runs, data.steps).T, strict=True):
-            cost = expected_running_time_interval(hit, spent, generator())
-            reached = hit[~np.isnan(hit)]
-            rows.append(
-                TargetRow(
-                    experiment=name,
-                    target=share * data.steps,
-                    share=share,
-                    fitness="stored",
-                    hits=reached.size,
-                    n=hit.size,
-                    expected_running_time=cost.value,
-                    expected_running_time_low=cost.low,
-                    expected_running_time_high=cost.high,
-                    median_evaluations=float(np.median(reached))
-                    if reached.size
-                    else None,
-                )
-            )
-    return rows
+            time = expected_running_time_interval(hit, spent, generator())
+            found.append(TargetCost(name, share * data.steps, share, hit, time))
+    return found
+
+
+TARGET_COLUMNS: Mapping[str, Callable[[TargetCost], Any]] = {
+    "experiment": lambda cost: cost.experiment,
+    "target": lambda cost: cost.target,
+    "share": lambda cost: cost.share,
+    "fitness": lambda cost: "stored",
+    "hits": lambda cost: cost.reached.size,
+    "n": lambda cost: cost.hits.size,
+    "expected_running_time": lambda cost: cost.time.value,
+    "expected_running_time_low": lambda cost: cost.time.low,
+    "expected_running_time_high": lambda cost: cost.time.high,
+    "median_evaluations": lambda cost: (
+        float(np.median(cost.reached)) if cost.reached.size else None
+    ),
+}
+"""Columns of targets.csv."""
+
+
+def target_rows(data: StudyData) -> list[dict[str, Any]]:
+    """A row per experiment with runs and target, as `TARGET_COLUMNS` says."""
+    return [
+        {column: value(cost) for column, value in TARGET_COLUMNS.items()}
+        for cost in target_costs(data)
+    ]
 
 
 def cost_of_targets_section(data: StudyData) -> list[Block]:
     """What each target cost."""
-    rows = target_rows(data)
-    goals = dict.fromkeys(row.target for row in rows)
-    found = {(row.experiment, row.target): row for row in rows}
+    costs = target_costs(data)
+    goals = dict.fromkeys(cost.target for cost in costs)
+    found = {(cost.experiment, cost.target): cost for cost in costs}
     return [
         Heading("Cost of targets"),
         Paragraph(
@@ -92,7 +99,6 @@ def cost_of_targets_section(data: StudyData) -> list[Block]:
     ]
 
 
-def _cost(row: TargetRow) -> str:
-    if not row.hits:
-        return f"none ({row.hits}/{row.n})"
-    return f"{evaluations(row.expected_running_time)} ({row.hits}/{row.n})"
+def _cost(cost: TargetCost) -> str:
+    time = evaluations(cost.time.value) if cost.reached.size else "none"
+    return f"{time} ({cost.reached.size}/{cost.hits.size})"

@@ -10,7 +10,7 @@ from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
 from evolution.pages.words import YARDSTICK_LABEL, label, probability, robot_name
 from evolution.report.contests import Contest, contests
 from evolution.report.measures import shown_robots
-from evolution.report.samples import FOLLOWING
+from evolution.report.samples import FOLLOWED
 from evolution.statistics.estimates import Interval, wilson
 from evolution.statistics.significance import FEWEST_FOR_STARS, LEVELS, fisher
 from evolution.study.data import RunData, StudyData
@@ -20,7 +20,7 @@ MATCHES, FOLLOWS = "matches the hand-written follower", "follows walls"
 
 The first asks for the yardstick's mean on the same starts: of one follower, which
 keeps 8 mm off the wall, where closer earns more. The second asks that at least
-`FOLLOWING` of the test trials are a wall follower's or a hugger's: the behaviour that
+`FOLLOWED` of the test trials are a wall follower's or a hugger's: the behaviour that
 the paper claims, whatever its fitness.
 """
 
@@ -75,7 +75,7 @@ def _criteria(data: StudyData, robot: str) -> dict[str, Callable[[RunData], bool
         found[MATCHES] = lambda run: run.held_out(robot) >= reference
     everything = [run for runs in data.runs.values() for run in runs]
     if all(run.scores.held_out[robot].behaviour for run in everything):
-        found[FOLLOWS] = lambda run: run.scores.held_out[robot].following >= FOLLOWING
+        found[FOLLOWS] = lambda run: run.scores.held_out[robot].following >= FOLLOWED
     return found
 
 
@@ -128,7 +128,7 @@ def success_section(data: StudyData) -> list[Block]:
     meanings = {
         MATCHES: f"held-out mean of at least the {YARDSTICK_LABEL}'s on the same "
         "starts; it keeps 8 mm off the wall, and closer earns more",
-        FOLLOWS: f"at least {FOLLOWING:.0%} of the test trials are a wall follower's "
+        FOLLOWS: f"at least {FOLLOWED:.0%} of the test trials are a wall follower's "
         "or a hugger's",
     }
     for criterion, meaning in meanings.items():

@@ -4,7 +4,7 @@ import numpy as np
 
 from evolution.pages.blocks import Block, Heading, Paragraph, Table
 from evolution.pages.words import NOTHING, label, robot_name, spread
-from evolution.report.samples import disturbed, like_for_like, most_believed
+from evolution.report.samples import like_for_like, most_believed_fitness, with_noise
 from evolution.study.data import StudyData
 
 WITH_NOISE = (
@@ -16,12 +16,12 @@ WITH_NOISE = (
 def what_stored_fitness_promised_section(data: StudyData) -> list[Block]:
     """What stored fitness promised and fresh starts did not keep."""
     robot = data.robots[0]
-    noisy = any(disturbed(data, name) for name in data.with_runs)
+    noisy = any(with_noise(data, name) for name in data.with_runs)
     rows = []
     for name, runs in data.with_runs.items():
         stored, held_out = data.stored(name), like_for_like(data, name)
         tested = np.isfinite(held_out)
-        believed, worth = most_believed(data, name)
+        believed, worth = most_believed_fitness(data, name)
         # by run, where every run says both
         both = held_out[tested].size == worth.size
         rows.append(
@@ -48,15 +48,8 @@ def what_stored_fitness_promised_section(data: StudyData) -> list[Block]:
         ),
         Table(
             (
-                "experiment",
-                "n",
-                "champion, stored",
-                "held-out",
-                "luck",
-                "most believed, stored",
-                "held-out",
-                "luck",
-                "regained",
+                *("experiment", "n", "champion, stored", "held-out", "luck"),
+                *("most believed, stored", "held-out", "luck", "regained"),
             ),
             rows,
         ),

@@ -57,13 +57,7 @@ def what_was_run_section(data: StudyData) -> list[Block]:
         ),
         Table(
             (
-                "experiment",
-                "name",
-                "seeds",
-                "n",
-                "budget",
-                "trials",
-                "spent",
+                *("experiment", "name", "seeds", "n", "budget", "trials", "spent"),
                 "control steps",
             ),
             [
@@ -74,12 +68,7 @@ def what_was_run_section(data: StudyData) -> list[Block]:
                     str(len(data.runs[name])),
                     f"{config.evaluations:,}",
                     str(config.trials),
-                    evaluations(
-                        max(
-                            (r.history["evaluations"][-1] for r in data.runs[name]),
-                            default=None,
-                        )
-                    ),
+                    _spent(data, name),
                     _steps(data, name),
                 )
                 for name, config in data.configs.items()
@@ -98,6 +87,11 @@ def what_was_run_section(data: StudyData) -> list[Block]:
         ),
     ]
     return blocks
+
+
+def _spent(data: StudyData, name: str) -> str:
+    spent = [run.history["evaluations"][-1] for run in data.runs[name]]
+    return evaluations(max(spent, default=None))
 
 
 def _steps(data: StudyData, name: str) -> str:

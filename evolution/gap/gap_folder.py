@@ -1,0 +1,135 @@
+"""The folder of the gap: who is tested in which worlds, and what is written of it."""
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from epuck_mj.host.files import write_text, writing
+from evolution.gap.figure import kept_figure
+from evolution.gap.gap_document import gap_document, gap_summary
+from evolution.gap.groups import experiments, peers
+from evolution.gap.outcomes import Outcome, abroad, ideal
+from evolution.gap.transfer import Transfer, verdict
+from evolution.gap.worlds import World, worlds
+from evolution.named_policies import NamedPolicy
+from evolution.pages.blocks import to_markdown
+from evolution.pages.csv_text import csv_text
+from evolution.pages.figure_files import write_figure
+
+Measured = tuple[list[Outcome], list[list[Outcome]], list[list[Outcome]]]
+"""At home, as ideal robots in each world's arena, in each world; one per policy."""
+
+
+def write_gap(
+    folder: Path,
+    policies: Sequence[NamedPolicy],
+    robots: Sequence[str],
+    n_worlds: int,
+    starts: int,
+    threads: int,
+) -> None:
+    """Measure policies in worlds, and write all that was found.
+
+    Args:
+        folder: an existing one.
+        policies: who is tested.
+        robots: that drive.
+        n_worlds: how many.
+        starts: test starts in each world, and at home.
+        threads: threads that step the robots; 0 is one per core.
+
+    Raises:
+        UserError: if a robot or an arena cannot be used, or a file not be written.
+    """
+    places = worlds(n_worlds)
+    measured = {
+        robot: _measured(policies, places, robot, starts, threads) for robot in robots
+    }
+    _write(folder, policies, places, measured, starts)
+
+
+def _measured(
+    policies: Sequence[NamedPolicy],
+    places: Sequence[World],
+    robot: str,
+    n: int,
+    threads: int,
+) -> Measured:
+    home = ideal(policies, robot, n, threads)
+    arenas = {
+        arena: ideal(policies, robot, n, threads, arena)
+        for arena in dict.fromkeys(place.arena for place in places)
+    }
+    outcomes = abroad(policies, places, robot, n, threads)
+    bar = tqdm(
+        outcomes,
+        total=len(places),
+        unit="world",
+        desc=robot,
+        disable=not sys.stderr.isatty(),
+    )
+    return home, [arenas[place.arena] for place in places], list(bar)
+
+
+def _write(
+    folder: Path,
+    policies: Sequence[NamedPolicy],
+    places: Sequence[World],
+    measured: dict[str, Measured],
+    starts: int,
+) -> None:
+    transfers = {robot: Transfer.of(*outcomes) for robot, outcomes in measured.items()}
+    groups = experiments(policies)
+    record = {
+        "worlds": [asdict(world) for world in places],
+        "starts": starts,
+        "robots": {
+            robot: {
+                policy.name: {
+                    **asdict(verdict(transfers[robot], i)),
+                    "ideal": [world[i].fitness for world in outcomes[1]],
+                    "abroad": [asdict(world[i]) for world in outcomes[2]],
+                }
+                for i, policy in enumerate(policies)
+            }
+            for robot, outcomes in measured.items()
+        },
+    }
+    with writing():
+        write_text(folder / "gap.json", json.dumps(record, indent=1) + "\n")
+        write_text(folder / "gap.csv", _rows(policies, places, transfers))
+        names = [policy.name for policy in policies]
+        latency = np.array([place.latency for place in places])
+        alike = peers(policies)
+        blocks = gap_document(names, transfers, groups, alike, starts, latency)
+        write_text(folder / "gap.md", to_markdown(blocks))
+        table = to_markdown([gap_summary(transfers, groups, alike)])
+        write_text(folder / "summary.md", table)
+    write_figure(kept_figure(transfers, groups), folder, "gap")
+
+
+def _rows(
+    policies: Sequence[NamedPolicy],
+    places: Sequence[World],
+    transfers: dict[str, Transfer],
+) -> str:
+    """A row per robot, policy and world."""
+    rows = [
+        {
+            "robot": robot,
+            "policy": policy.name,
+            "world": j,
+            "share": f"{transfer.share[j, i]:.4f}",
+            "collisions_per_minute": f"{transfer.collisions[j, i]:.4f}",
+            **asdict(world),
+        }
+        for robot, transfer in transfers.items()
+        for i, policy in enumerate(policies)
+        for j, world in enumerate(places)
+    ]
+    return csv_text(list(rows[0]), rows)
