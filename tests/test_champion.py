@@ -29,7 +29,7 @@ from evolution.run.champion import (
     most_believed,
 )
 from evolution.run.directory import RunDirectory
-from evolution.run.generation_loop import Experiment, Record
+from evolution.run.generation_loop import Evolution, Record
 from evolution.run.results import write_results
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
@@ -52,7 +52,7 @@ def judges_of(config: ExperimentConfig) -> dict[str, Judge]:
 @pytest.fixture(scope="module", params=SHIPPED)
 def finished(request):
     """A finished run of each algorithm, and what it was after each generation."""
-    experiment = Experiment(tiny(request.param), threads=1)
+    experiment = Evolution(tiny(request.param), threads=1)
     generations = [
         (experiment.optimizer.population.copy(), experiment.optimizer.fitness.copy())
         for _ in experiment.run()
@@ -60,7 +60,7 @@ def finished(request):
     return experiment, generations
 
 
-def slow_trial(experiment: Experiment, genome, start) -> tuple[float, bool]:
+def slow_trial(experiment: Evolution, genome, start) -> tuple[float, bool]:
     """Fitness of a genome's trial on one start, alone, and whether it crashed."""
     task = experiment.config.task
     policy = experiment.config.network.decode(genome)
@@ -109,7 +109,7 @@ def test_candidates_are_the_top_tenth_and_the_best_so_far(finished):
 
 
 def test_the_latest_twenty_of_the_best_so_far_are_candidates():
-    experiment = Experiment(tiny("ga"))
+    experiment = Evolution(tiny("ga"))
     rng, genes = np.random.default_rng(1), experiment.config.network.n_genes
     told = rng.random(20)
     experiment.optimizer.ask()
@@ -129,7 +129,7 @@ def test_the_latest_twenty_of_the_best_so_far_are_candidates():
 
 
 def test_a_genome_that_is_both_is_one_candidate():
-    experiment = Experiment(tiny("ga"))
+    experiment = Evolution(tiny("ga"))
     next(experiment.run())
     population, fitness = experiment.optimizer.population, experiment.optimizer.fitness
     order = np.argsort(-fitness, kind="stable")[:2]
@@ -140,7 +140,7 @@ def test_a_genome_that_is_both_is_one_candidate():
 
 @pytest.mark.parametrize(("population", "n"), [(4, 1), (14, 1), (16, 2), (31, 3)])
 def test_the_tenth_is_rounded_and_at_least_one(population, n):
-    experiment = Experiment(tiny("ga", population=population))
+    experiment = Evolution(tiny("ga", population=population))
     fitness = np.random.default_rng(2).permutation(population).astype(float)
     experiment.optimizer.ask()
     experiment.optimizer.tell(fitness)
@@ -175,7 +175,7 @@ def test_the_champion_is_best_on_the_validation_starts(finished, monkeypatch):
 
 def test_stored_fitness_does_not_choose_the_champion():
     """A lucky draw is a candidate, and loses to who is better on fresh starts."""
-    experiment = Experiment(tiny("ga", steps=10))
+    experiment = Evolution(tiny("ga", steps=10))
     genes = experiment.config.network.n_genes
     # fast and straight ahead; standing still
     fast, still = np.zeros(genes), np.zeros(genes)
@@ -236,7 +236,7 @@ def few_test_starts():
 def written(tmp_path_factory):
     """Results of a run, without the pictures."""
     directory = RunDirectory(tmp_path_factory.mktemp("run"))
-    experiment = Experiment(tiny("de-best", steps=20), threads=1)
+    experiment = Evolution(tiny("de-best", steps=20), threads=1)
     list(experiment.run())
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(results, "_draw_fitness", lambda *_: None)
@@ -292,7 +292,7 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
     monkeypatch.setattr(results, "_draw_fitness", lambda *_: None)
     monkeypatch.setattr(results, "_show", lambda *_: None)
     config = tiny("ga", steps=60, noise="strong", randomise=True)
-    experiment = Experiment(config, threads=1)
+    experiment = Evolution(config, threads=1)
     list(experiment.run())
     directory = RunDirectory(tmp_path)
     scores = write_results(experiment, judges_of(config), directory, threads=1)
@@ -334,7 +334,7 @@ def test_a_run_on_the_wheeled_robot_is_tested_on_the_plane_as_well(
 ):
     monkeypatch.setattr(results, "_draw_fitness", lambda *_: None)
     monkeypatch.setattr(results, "_show", lambda *_: None)
-    experiment = Experiment(tiny("ga", robot="epuck", steps=10, evaluations=20))
+    experiment = Evolution(tiny("ga", robot="epuck", steps=10, evaluations=20))
     list(experiment.run())
     directory = RunDirectory(tmp_path)
     scores = write_results(experiment, judges_of(experiment.config), directory)
@@ -349,7 +349,7 @@ def test_a_champion_survives_the_checkpoint(finished, tmp_path, monkeypatch):
     experiment, _ = finished
     path = tmp_path / "checkpoint.npz"
     files.write_arrays(path, experiment.state())
-    resumed = Experiment(experiment.config, threads=1)
+    resumed = Evolution(experiment.config, threads=1)
     resumed.restore(files.read_arrays(path))
     left, right = candidates(experiment), candidates(resumed)
     for a, b in zip(left, right, strict=True):

@@ -28,7 +28,7 @@ from epuck_mj.step.motors import wheel_speeds
 from epuck_mj.step.sensors import proximity
 from evolution.judging import evaluation
 from evolution.judging.evaluation import BatchEngine, DmControlEngine, Work, evaluate
-from evolution.run.generation_loop import Experiment, make_engine
+from evolution.run.generation_loop import Evolution, make_engine
 from evolution.settings.config import ExperimentConfig
 
 TASK = TaskParameters(steps=40)
@@ -277,7 +277,7 @@ def test_a_known_robot_differs_from_one_whose_gains_nobody_knows(scene):
 
 
 def histories(config, **settings):
-    experiment = Experiment(config, threads=1, **settings)
+    experiment = Evolution(config, threads=1, **settings)
     steps = sum(record.control_steps for record in experiment.run())
     return experiment.history(), steps
 

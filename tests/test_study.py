@@ -603,23 +603,23 @@ def test_checkpoints_take_a_small_share_of_the_time(here, carried, monkeypatch):
             return now
 
     class Directory(RunDirectory):
-        def save(self, experiment, seconds):
+        def save(self, evolution, seconds):
             nonlocal now
-            super().save(experiment, seconds)
-            saves.append((len(experiment.records), list(seconds)))
+            super().save(evolution, seconds)
+            saves.append((len(evolution.records), list(seconds)))
             now += 2
 
     config = load_config(here / "one.yaml").model_copy(update={"evaluations": 1000})
     evolution = execution.Run(config, Directory(here / "run"), Means(), ())
     monkeypatch.setattr(execution, "time", Clock)
-    evaluate = evolution.experiment.engine.run
+    evaluate = evolution.evolution.engine.run
 
     def slow(*arguments):
         nonlocal now
         now += 1
         return evaluate(*arguments)
 
-    monkeypatch.setattr(evolution.experiment.engine, "run", slow)
+    monkeypatch.setattr(evolution.evolution.engine, "run", slow)
     evolution.start()
     assert len(list(evolution.evolve())) == 100
     # the first, so that there is one, and the last; 5 % of 41 s is more than 2 s
