@@ -26,7 +26,7 @@ from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.bridge.line.serial_port import SerialPort
 from epuck_mj.host.files import read_arrays
-from epuck_mj.policies.file import load
+from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.step.calibration import Calibration
@@ -67,7 +67,7 @@ def main(options: Options) -> None:
     """Measure, print and write."""
     task, policy = TaskParameters(), WallFollower()
     if options.champion is not None:
-        file = load(options.champion)
+        file = load_controller(options.champion)
         task, policy = file.task, file.controller
     results = {}
     for robot in ROBOTS:

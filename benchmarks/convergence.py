@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 import tyro
 
-from epuck_mj.policies.file import load
+from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.model import Scene, load_scene
@@ -106,8 +106,8 @@ def configurations(robot: str, shipped: float) -> list[Configuration]:
 def controllers(n: int) -> dict[str, BatchPolicy]:
     """The fixed set, each as a policy for `n` robots."""
     files = [CHAMPIONS / f"seed-{seed}" / "champion.json" for seed in SEEDS]
-    evolved = {f"de-best-{path.parent.name}": load(path) for path in files}
-    evolved["fragile"] = load(FRAGILE)
+    evolved = {f"de-best-{path.parent.name}": load_controller(path) for path in files}
+    evolved["fragile"] = load_controller(FRAGILE)
     policies: dict[str, BatchPolicy] = {"by hand": WallFollower()}
     for name, file in evolved.items():
         policies[name] = file.network.decode(np.tile(file.genome, (n, 1)))

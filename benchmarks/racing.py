@@ -21,7 +21,7 @@ from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse
 from epuck_mj.step.control import Trials
 from evolution.judging.evaluation import BatchEngine, Work
-from evolution.run.generation_loop import Experiment
+from evolution.run.generation_loop import Evolution
 from evolution.settings.config_files import find_config, load_config
 from evolution.study.config import parse_seeds
 
@@ -81,7 +81,7 @@ def racing(argv: Sequence[str]) -> int:
     runs = []
     for seed in parse_seeds(options.seeds):
         seeded = config.model_copy(update={"seed": seed})
-        experiment = Experiment(seeded, threads=options.threads)
+        experiment = Evolution(seeded, threads=options.threads)
         both = BothWays(BatchEngine(experiment.scene, seeded.task, options.threads))
         experiment.engine = both
         for record in experiment.run():

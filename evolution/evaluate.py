@@ -57,7 +57,7 @@ class Options:
     json: Path | None = None
 
 
-def evaluate(argv: Sequence[str]) -> int:
+def evaluate_policies(argv: Sequence[str]) -> int:
     """Run the command line; its exit status.
 
     Raises:
@@ -143,4 +143,4 @@ def _number(value: float | None, scale: float = 1, unit: str = "") -> str:
 
 
 if __name__ == "__main__":
-    main(evaluate)
+    main(evaluate_policies)

@@ -14,7 +14,7 @@ import numpy as np
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.policies import file as controller_file
+from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import START_CLEARANCE, Policy, TaskParameters
@@ -102,7 +102,7 @@ def named_policies(path: str, generations: str | None = None) -> list[NamedPolic
 
 
 def _champion(path: Path, name: str, config: ExperimentConfig | None) -> NamedPolicy:
-    file = controller_file.load(path)
+    file = load_controller(path)
     clearance = file.origin.start_clearance
     if clearance is None:
         clearance = config.start_clearance if config else START_CLEARANCE

@@ -16,8 +16,7 @@ import tyro
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import check_threads, main, parse
-from epuck_mj.policies import file as controller_file
-from epuck_mj.policies.file import ControllerFile
+from epuck_mj.policies.file import ControllerFile, load_controller
 from evolution.judging.scores import Scores
 from evolution.judging.starts import held_out_disturbances
 from evolution.run.directory import RunDirectory
@@ -84,7 +83,10 @@ def _runs(path: Path) -> list[RunDirectory]:
 
 def _verified(run: RunDirectory, judges: "Judges") -> bool:
     """Whether all scores are the same; says so, or what differs."""
-    config, champion = run.stored_config(), controller_file.load(run.champion)
+    config, champion = (
+        run.stored_config(),
+        load_controller(run.champion),
+    )
     scores = Scores.read(champion.scores, run.champion)
     differing = [
         *_differing(champion, scores, config, judges),

@@ -18,7 +18,7 @@ from epuck_mj.rungs.disturbed import DisturbedRobots
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.control import Policy, TaskParameters, control_step
-from epuck_mj.step.disturbances import Noise, draw
+from epuck_mj.step.disturbances import Noise, draw_disturbances
 from epuck_mj.step.motors import STEP_ANGLE, command, step_rates
 from epuck_mj.step.sensors import observe, proximity, sensed_distance
 
@@ -103,7 +103,7 @@ def nominal(
         start: pose `(3,)`: x, y [m], yaw [rad].
         n_steps: control steps.
     """
-    met = draw(np.random.default_rng(0), 1, n_steps, QUIET)
+    met = draw_disturbances(np.random.default_rng(0), 1, n_steps, QUIET)
     robots = DisturbedRobots(MujocoRobots(scene, 1, 1), met, task.control_step)
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     poses = [robots.poses()[0]]

@@ -64,7 +64,7 @@ def test_its_individuals_are_worth_what_it_says(tmp_path):
     run.start()
     (first, *_) = run.evolve()
     best = files.read_arrays(tmp_path / "run" / "best_individuals.npz")
-    experiment = run.experiment
+    experiment = run.evolution
     rng = random_generator(experiment.config.seed, Purpose.STARTS, 0)
     starts = experiment.space.sample(rng, 1)
     fitness = evaluate(

@@ -45,7 +45,7 @@ from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.step.calibration import Calibration
-from epuck_mj.step.disturbances import Noise, calibrated
+from epuck_mj.step.disturbances import Noise, draw_calibrated
 from epuck_mj.step.motors import STEP_ANGLE
 from epuck_mj.step.sensors import counted, proximity
 from tests.processes import PATIENCE, python_process
@@ -638,7 +638,7 @@ def test_a_calibrated_robot_in_simulation(tmp_path, planar):
     calibration = Calibration(tuple(GAINS), RADII, 0.0562)
     quiet = Noise(counts=0.0, wheels=0.0, age=0.0)
     rng = np.random.default_rng(0)
-    disturbances = calibrated(calibration, rng, 2, 20, quiet)
+    disturbances = draw_calibrated(calibration, rng, 2, 20, quiet)
     robots = DisturbedRobots(MujocoRobots(planar, 2, 1), disturbances, 0.1)
     other = MujocoRobots(changed_robot(tmp_path, RADII, 0.0562), 2, 1)
     starts = np.array([[0.3, 0.0, 1.0], [0.44, 0.1, 1.5]])

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from epuck_mj.host import files
-from epuck_mj.policies import file as controller_file
-from epuck_mj.policies.file import Origin
+from epuck_mj.policies.file import Origin, load_controller
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.step.control import control_step
 from epuck_mj.step.sensors import observe
@@ -30,7 +29,7 @@ from evolution.run.champion import (
     most_believed,
 )
 from evolution.run.directory import RunDirectory
-from evolution.run.generation_loop import Experiment, Record
+from evolution.run.generation_loop import Evolution, Record
 from evolution.run.results import write_results
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
@@ -53,7 +52,7 @@ def judges_of(config: ExperimentConfig) -> dict[str, Judge]:
 @pytest.fixture(scope="module", params=SHIPPED)
 def finished(request):
     """A finished run of each algorithm, and what it was after each generation."""
-    experiment = Experiment(tiny(request.param), threads=1)
+    experiment = Evolution(tiny(request.param), threads=1)
     generations = [
         (experiment.optimizer.population.copy(), experiment.optimizer.fitness.copy())
         for _ in experiment.run()
@@ -61,7 +60,7 @@ def finished(request):
     return experiment, generations
 
 
-def slow_trial(experiment: Experiment, genome, start) -> tuple[float, bool]:
+def slow_trial(experiment: Evolution, genome, start) -> tuple[float, bool]:
     """Fitness of a genome's trial on one start, alone, and whether it crashed."""
     task = experiment.config.task
     policy = experiment.config.network.decode(genome)
@@ -110,7 +109,7 @@ def test_candidates_are_the_top_tenth_and_the_best_so_far(finished):
 
 
 def test_the_latest_twenty_of_the_best_so_far_are_candidates():
-    experiment = Experiment(tiny("ga"))
+    experiment = Evolution(tiny("ga"))
     rng, genes = np.random.default_rng(1), experiment.config.network.n_genes
     told = rng.random(20)
     experiment.optimizer.ask()
@@ -130,7 +129,7 @@ def test_the_latest_twenty_of_the_best_so_far_are_candidates():
 
 
 def test_a_genome_that_is_both_is_one_candidate():
-    experiment = Experiment(tiny("ga"))
+    experiment = Evolution(tiny("ga"))
     next(experiment.run())
     population, fitness = experiment.optimizer.population, experiment.optimizer.fitness
     order = np.argsort(-fitness, kind="stable")[:2]
@@ -141,7 +140,7 @@ def test_a_genome_that_is_both_is_one_candidate():
 
 @pytest.mark.parametrize(("population", "n"), [(4, 1), (14, 1), (16, 2), (31, 3)])
 def test_the_tenth_is_rounded_and_at_least_one(population, n):
-    experiment = Experiment(tiny("ga", population=population))
+    experiment = Evolution(tiny("ga", population=population))
     fitness = np.random.default_rng(2).permutation(population).astype(float)
     experiment.optimizer.ask()
     experiment.optimizer.tell(fitness)
@@ -176,7 +175,7 @@ def test_the_champion_is_best_on_the_validation_starts(finished, monkeypatch):
 
 def test_stored_fitness_does_not_choose_the_champion():
     """A lucky draw is a candidate, and loses to who is better on fresh starts."""
-    experiment = Experiment(tiny("ga", steps=10))
+    experiment = Evolution(tiny("ga", steps=10))
     genes = experiment.config.network.n_genes
     # fast and straight ahead; standing still
     fast, still = np.zeros(genes), np.zeros(genes)
@@ -237,7 +236,7 @@ def few_test_starts():
 def written(tmp_path_factory):
     """Results of a run, without the pictures."""
     directory = RunDirectory(tmp_path_factory.mktemp("run"))
-    experiment = Experiment(tiny("de-best", steps=20), threads=1)
+    experiment = Evolution(tiny("de-best", steps=20), threads=1)
     list(experiment.run())
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(results, "_draw_fitness", lambda *_: None)
@@ -249,7 +248,7 @@ def written(tmp_path_factory):
 def test_the_champion_file_loads_and_acts_bit_for_bit(written):
     experiment, directory = written
     champion = choose_champion(experiment.engine, experiment)
-    stored = controller_file.load(directory.champion)
+    stored = load_controller(directory.champion)
     assert stored.genome.tobytes() == champion.genome.tobytes()
     assert stored.network == experiment.config.network
     observation = np.random.default_rng(3).random((100, 8))
@@ -263,7 +262,7 @@ def test_the_champion_file_loads_and_acts_bit_for_bit(written):
 def test_the_champion_file_holds_every_score(written):
     experiment, directory = written
     champion = choose_champion(experiment.engine, experiment)
-    stored = controller_file.load(directory.champion)
+    stored = load_controller(directory.champion)
     policy = experiment.config.network.decode(champion.genome)
     tests = {
         robot: judge.test(policy)
@@ -293,11 +292,11 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
     monkeypatch.setattr(results, "_draw_fitness", lambda *_: None)
     monkeypatch.setattr(results, "_show", lambda *_: None)
     config = tiny("ga", steps=60, noise="strong", randomise=True)
-    experiment = Experiment(config, threads=1)
+    experiment = Evolution(config, threads=1)
     list(experiment.run())
     directory = RunDirectory(tmp_path)
     scores = write_results(experiment, judges_of(config), directory, threads=1)
-    stored = controller_file.load(directory.champion)
+    stored = load_controller(directory.champion)
     assert Scores.read(stored.scores, directory.champion) == scores
     found = scores.held_out_as_evolved
     assert list(found) == list(scores.held_out) == ["epuck_planar", "epuck"]
@@ -313,7 +312,7 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
 
 def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
     _, directory = written
-    stored = controller_file.load(directory.champion).scores
+    stored = load_controller(directory.champion).scores
     scores = Scores.read(stored, directory.champion)
     fresh, believed = scores.in_lines(20).splitlines()
     parts = []
@@ -335,12 +334,12 @@ def test_a_run_on_the_wheeled_robot_is_tested_on_the_plane_as_well(
 ):
     monkeypatch.setattr(results, "_draw_fitness", lambda *_: None)
     monkeypatch.setattr(results, "_show", lambda *_: None)
-    experiment = Experiment(tiny("ga", robot="epuck", steps=10, evaluations=20))
+    experiment = Evolution(tiny("ga", robot="epuck", steps=10, evaluations=20))
     list(experiment.run())
     directory = RunDirectory(tmp_path)
     scores = write_results(experiment, judges_of(experiment.config), directory)
     assert list(scores.held_out) == ["epuck", "epuck_planar"]
-    written = controller_file.load(directory.champion)
+    written = load_controller(directory.champion)
     assert directory.champion.read_text(encoding="utf-8") == written.to_json()
     assert len(scores.in_lines(10).splitlines()) == 2
 
@@ -350,7 +349,7 @@ def test_a_champion_survives_the_checkpoint(finished, tmp_path, monkeypatch):
     experiment, _ = finished
     path = tmp_path / "checkpoint.npz"
     files.write_arrays(path, experiment.state())
-    resumed = Experiment(experiment.config, threads=1)
+    resumed = Evolution(experiment.config, threads=1)
     resumed.restore(files.read_arrays(path))
     left, right = candidates(experiment), candidates(resumed)
     for a, b in zip(left, right, strict=True):

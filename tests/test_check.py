@@ -11,7 +11,7 @@ import pytest
 from matplotlib.image import imread
 
 from epuck_mj.check import report
-from epuck_mj.check.__main__ import run
+from epuck_mj.check.__main__ import check as check_command
 from epuck_mj.check.arena import check_arena
 from epuck_mj.check.findings import Severity
 from epuck_mj.check.source import read
@@ -59,7 +59,7 @@ def check(tmp_path, monkeypatch, capsys):
 
     def check(text: str, *arguments: str) -> tuple[int, list[str]]:
         Path("my.xml").write_text(text)
-        status = run(["my.xml", *arguments])
+        status = check_command(["my.xml", *arguments])
         return status, capsys.readouterr().out.splitlines()
 
     return check

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from epuck_mj.errors import UserError
-from epuck_mj.policies.file import ControllerFile, Origin, load
+from epuck_mj.policies.file import ControllerFile, Origin, load_controller
 from epuck_mj.policies.network import Network
 from epuck_mj.step.control import TaskParameters
 
@@ -23,7 +23,7 @@ def stored() -> ControllerFile:
 def test_file_comes_back_bit_for_bit(tmp_path, stored):
     path = tmp_path / "champion.json"
     path.write_text(stored.to_json())
-    back = load(path)
+    back = load_controller(path)
     np.testing.assert_array_equal(back.genome, stored.genome)
     for name in ("network", "task", "origin", "scores"):
         assert getattr(back, name) == getattr(stored, name)
@@ -64,7 +64,7 @@ def test_foreign_files_are_refused(tmp_path, stored, change, expected):
     path = tmp_path / "champion.json"
     path.write_text(json.dumps(json.loads(stored.to_json()) | change))
     with pytest.raises(UserError, match="is not a controller file") as error:
-        load(path)
+        load_controller(path)
     assert expected in str(error.value)
 
 
@@ -87,20 +87,20 @@ def test_another_task_is_refused(tmp_path, stored, change, expected):
     path = tmp_path / "champion.json"
     path.write_text(json.dumps(fields))
     with pytest.raises(UserError, match="not the parameters of a task: ") as error:
-        load(path)
+        load_controller(path)
     assert expected in str(error.value)
 
 
 def test_missing_and_broken_files_are_refused(tmp_path, stored):
     with pytest.raises(UserError, match="cannot read"):
-        load(tmp_path / "nothing.json")
+        load_controller(tmp_path / "nothing.json")
     path = tmp_path / "half.json"
     path.write_text(stored.to_json()[:100])
     with pytest.raises(UserError, match="is not JSON"):
-        load(path)
+        load_controller(path)
     path.write_text("[1, 2]")
     with pytest.raises(UserError, match="expected a mapping of keys to values, got l"):
-        load(path)
+        load_controller(path)
 
 
 def test_files_of_before_do_not_say_how_clear_their_starts_were(tmp_path, stored):
@@ -109,7 +109,7 @@ def test_files_of_before_do_not_say_how_clear_their_starts_were(tmp_path, stored
     fields["scene"]["note"] = "of a person"
     path = tmp_path / "champion.json"
     path.write_text(json.dumps(fields))
-    origin = load(path).origin
+    origin = load_controller(path).origin
     assert (origin.robot, origin.arena, origin.start_clearance) == (
         "epuck",
         "arena",

@@ -21,14 +21,14 @@ from epuck_mj.step.disturbances import (
     RANGES,
     Disturbances,
     Noise,
-    calibrated,
-    draw,
+    draw_calibrated,
+    draw_disturbances,
 )
 from epuck_mj.step.motors import wheel_speeds
 from epuck_mj.step.sensors import proximity
 from evolution.judging import evaluation
 from evolution.judging.evaluation import BatchEngine, DmControlEngine, Work, evaluate
-from evolution.run.generation_loop import Experiment, make_engine
+from evolution.run.generation_loop import Evolution, make_engine
 from evolution.settings.config import ExperimentConfig
 
 TASK = TaskParameters(steps=40)
@@ -45,7 +45,7 @@ def scene(request):
 
 def drawn(n, noise=NOISE["calibrated"], ranges=RANGES, seed=0, **changes):
     assert noise is not None
-    found = draw(np.random.default_rng(seed), n, STEPS, noise, ranges)
+    found = draw_disturbances(np.random.default_rng(seed), n, STEPS, noise, ranges)
     return dataclasses.replace(found, **changes)
 
 
@@ -262,7 +262,7 @@ def test_a_config_keeps_the_calibration_not_its_path(tmp_path):
 
 
 def test_a_known_robot_differs_from_one_whose_gains_nobody_knows(scene):
-    known = calibrated(CALIBRATION, np.random.default_rng(0), 3, STEPS, QUIET)
+    known = draw_calibrated(CALIBRATION, np.random.default_rng(0), 3, STEPS, QUIET)
     robots = robots_on(scene, STARTS, known)
     deceived = robots_on(
         scene, STARTS, dataclasses.replace(known, known_gains=np.ones((3, 8)))
@@ -277,7 +277,7 @@ def test_a_known_robot_differs_from_one_whose_gains_nobody_knows(scene):
 
 
 def histories(config, **settings):
-    experiment = Experiment(config, threads=1, **settings)
+    experiment = Evolution(config, threads=1, **settings)
     steps = sum(record.control_steps for record in experiment.run())
     return experiment.history(), steps
 
@@ -295,7 +295,7 @@ def test_racing_and_seed_under_noise():
 
 def test_noise_of_generations_differs():
     first, second = (
-        draw(np.random.default_rng(seed), 2, 25, NOISE["strong"] or QUIET)
+        draw_disturbances(np.random.default_rng(seed), 2, 25, NOISE["strong"] or QUIET)
         for seed in (1, 2)
     )
     assert not np.array_equal(first.count_noise, second.count_noise)

@@ -10,10 +10,10 @@ import pytest
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import read_arrays
-from epuck_mj.policies.file import load
+from epuck_mj.policies.file import load_controller
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.calibration import Calibration
-from evolution.evaluate import evaluate
+from evolution.evaluate import evaluate_policies
 from evolution.judging.held_out import Judge, Judges
 from evolution.run.directory import RunDirectory
 from evolution.run.execution import Run
@@ -39,8 +39,8 @@ def finished(tmp_path_factory) -> Path:
 
 def test_evaluation_says_what_the_run_said(finished, tmp_path, capsys):
     out = tmp_path / "out.json"
-    assert evaluate([str(finished), "--json", str(out)]) == 0
-    written = load(finished / "champion.json").scores["held_out"]
+    assert evaluate_policies([str(finished), "--json", str(out)]) == 0
+    written = load_controller(finished / "champion.json").scores["held_out"]
     tests = json.loads(out.read_text())
     assert (
         [test["robot"] for test in tests] == list(written) == ["epuck_planar", "epuck"]
@@ -55,7 +55,10 @@ def test_evaluation_says_what_the_run_said(finished, tmp_path, capsys):
 def test_a_study_a_run_and_a_file_lead_to_the_same_champion(finished, capsys):
     study = finished.parent.parent
     for path in (study, finished, finished / "champion.json"):
-        assert evaluate([str(path), "--starts", "5", "--robot", "epuck_planar"]) == 0
+        assert (
+            evaluate_policies([str(path), "--starts", "5", "--robot", "epuck_planar"])
+            == 0
+        )
     blocks = capsys.readouterr().out.split("epuck_planar in arena\n")
     outcomes = [re.sub(r"\n\S.*", "", block, flags=re.S) for block in blocks[1:]]
     assert len(outcomes) == 3
@@ -65,7 +68,7 @@ def test_a_study_a_run_and_a_file_lead_to_the_same_champion(finished, capsys):
 def test_generations_are_tested_one_by_one(finished, tmp_path, capsys):
     out = tmp_path / "out.json"
     few = ["--starts", "20", "--robot", "epuck_planar", "--json", str(out)]
-    assert evaluate([str(finished), "--generations", "0,last", *few]) == 0
+    assert evaluate_policies([str(finished), "--generations", "0,last", *few]) == 0
     tests = json.loads(out.read_text())
     names = [f"{finished} generation 0", f"{finished} generation 1"]
     assert [test["name"] for test in tests] == names
@@ -81,7 +84,7 @@ def test_generations_are_tested_one_by_one(finished, tmp_path, capsys):
 
 def test_the_hand_written_follower_follows(capsys):
     arguments = ["wall-follower", "--starts", "10", "--robot", "epuck_planar"]
-    assert evaluate(arguments) == 0
+    assert evaluate_policies(arguments) == 0
     assert "behaviour: wall follower 100.0%" in capsys.readouterr().out
 
 
@@ -98,7 +101,7 @@ def test_another_arena(finished, tmp_path, capsys):
     )
     arena.write_text(f"<mujoco><worldbody>{walls}</worldbody></mujoco>")
     arguments = ["--starts", "5", "--arena", str(arena), "--robot", "epuck_planar"]
-    assert evaluate([str(finished), *arguments]) == 0
+    assert evaluate_policies([str(finished), *arguments]) == 0
     assert "epuck_planar in small.xml" in capsys.readouterr().out
 
 
@@ -116,7 +119,7 @@ def test_another_arena(finished, tmp_path, capsys):
 def test_bad_input_gets_one_line(arguments, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match=re.escape(message)) as error:
-        evaluate(arguments)
+        evaluate_policies(arguments)
     assert "\n" not in str(error.value)
 
 
@@ -194,7 +197,7 @@ def test_verify_needs_a_champion(tmp_path):
 
 
 def test_the_most_believed_is_tested_too(finished):
-    scores = load(finished / "champion.json").scores
+    scores = load_controller(finished / "champion.json").scores
     history = np.genfromtxt(finished / "history.csv", delimiter=",", names=True)
     assert scores["most_believed"]["stored"] == history["best"].max()
     assert 0 <= scores["most_believed"]["held_out"] <= 20
@@ -208,7 +211,7 @@ def test_a_robot_that_was_measured(finished, tmp_path):
     options = [str(finished), "--starts", "5", "--noise", "calibrated"]
     means = []
     for more in ([], ["--randomise"], own):
-        assert evaluate([*options, *more, "--json", str(out)]) == 0
+        assert evaluate_policies([*options, *more, "--json", str(out)]) == 0
         means.append(tuple(test["mean"] for test in json.loads(out.read_text())))
     assert len(set(means)) == 3
     assert json.loads(out.read_text())[0]["calibration"] == {
@@ -224,4 +227,4 @@ def test_a_robot_that_was_measured(finished, tmp_path):
         (*options, "--calibration", "no.yaml"): "cannot read 'no.yaml'",
     }.items():
         with pytest.raises(UserError, match=message):
-            evaluate(list(wrong))
+            evaluate_policies(list(wrong))

@@ -11,7 +11,7 @@ from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.step.control import TaskParameters, control_step
 from epuck_mj.step.sensors import observe
 from evolution.judging.starts import starts_for_test, starts_for_validation
-from evolution.run.generation_loop import HISTORY, Experiment, Record
+from evolution.run.generation_loop import HISTORY, Evolution, Record
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from evolution.settings.randomness import Purpose, random_generator
@@ -30,7 +30,7 @@ def tiny(name: str, population: int = 8, **update) -> ExperimentConfig:
 
 def evolved(config: ExperimentConfig, generations: int | None = None, **how):
     """An experiment after so many generations; all of them if None."""
-    experiment = Experiment(config, **{"threads": 1, **how})
+    experiment = Evolution(config, **{"threads": 1, **how})
     run = experiment.run()
     for _ in run if generations is None else range(generations):
         if generations is not None:
@@ -38,7 +38,7 @@ def evolved(config: ExperimentConfig, generations: int | None = None, **how):
     return experiment
 
 
-def assert_same(a: Experiment, b: Experiment) -> None:
+def assert_same(a: Evolution, b: Evolution) -> None:
     """Equal to the last bit, in all that is saved."""
     assert a.history() == b.history()
     left, right = a.state(), b.state()
@@ -68,7 +68,7 @@ class Watched:
         return trials
 
 
-def watch(experiment: Experiment) -> Watched:
+def watch(experiment: Evolution) -> Watched:
     watched = Watched(experiment.engine)
     experiment.engine = watched
     return watched
@@ -110,7 +110,7 @@ def test_both_engines_give_the_same_bytes(name):
 
 def test_unknown_engine_is_refused_with_the_available_ones():
     with pytest.raises(UserError, match=r"'stage'; available: batch, dm_control$"):
-        Experiment(tiny("ga"), engine="stage")
+        Evolution(tiny("ga"), engine="stage")
 
 
 def test_streams_depend_on_each_part_of_their_key():
@@ -139,7 +139,7 @@ def slow_trial(scene, policy, start, task: TaskParameters) -> tuple[float, int, 
 
 
 def test_a_generations_record_against_a_slow_loop():
-    experiment = Experiment(tiny("ga", steps=40, trials=3), threads=1)
+    experiment = Evolution(tiny("ga", steps=40, trials=3), threads=1)
     generation = experiment.run()
     next(generation)
     record = next(generation)
@@ -172,7 +172,7 @@ def test_a_generations_record_against_a_slow_loop():
 
 @every_experiment
 def test_records_describe_the_optimizers_stored_fitness(name):
-    experiment = Experiment(tiny(name), threads=1)
+    experiment = Evolution(tiny(name), threads=1)
     watched = watch(experiment)
     for i, record in enumerate(experiment.run()):
         fitness = experiment.optimizer.fitness
@@ -192,7 +192,7 @@ def test_records_describe_the_optimizers_stored_fitness(name):
 
 @every_experiment
 def test_a_trial_that_ends_in_no_number_counts_as_nothing(name):
-    experiment = Experiment(tiny(name), threads=1)
+    experiment = Evolution(tiny(name), threads=1)
     sound = experiment.engine.run
 
     def broken(work):
@@ -207,7 +207,7 @@ def test_a_trial_that_ends_in_no_number_counts_as_nothing(name):
     assert record.mean == np.maximum(fitness, 0).mean()
     assert record.std == np.maximum(fitness, 0).std()
     # and the run can be read, and goes on
-    resumed = Experiment(tiny(name), threads=1)
+    resumed = Evolution(tiny(name), threads=1)
     resumed.restore(through_a_file(experiment.state()))
     assert_same(resumed, experiment)
 
@@ -231,7 +231,7 @@ def test_history_reads_back_exactly():
 
 
 def test_no_history_yet():
-    experiment = Experiment(tiny("ga"))
+    experiment = Evolution(tiny("ga"))
     assert experiment.history() == ",".join(HISTORY) + "\n"
     assert (experiment.evaluations, experiment.finished) == (0, False)
 
@@ -262,14 +262,14 @@ def test_reevaluated_parents_are_counted(evaluations, spent):
 @every_experiment
 def test_a_budget_below_one_generation_is_refused(name):
     with pytest.raises(UserError, match=r"at least one generation, 8 .*, got 7$"):
-        Experiment(tiny(name, evaluations=7))
+        Evolution(tiny(name, evaluations=7))
 
 
 def test_an_initial_range_that_the_optimizer_cannot_have_is_refused():
     with pytest.raises(UserError, match="initial range"):
-        Experiment(tiny("ga", weight_init=1.0))
+        Evolution(tiny("ga", weight_init=1.0))
     with pytest.raises(UserError, match="initial range"):
-        Experiment(tiny("de-best", weight_init=6.0))
+        Evolution(tiny("de-best", weight_init=6.0))
 
 
 # state
@@ -278,7 +278,7 @@ def test_an_initial_range_that_the_optimizer_cannot_have_is_refused():
 @every_experiment
 def test_resumed_is_uninterrupted(name):
     config = tiny(name)
-    resumed = Experiment(config, threads=1)
+    resumed = Evolution(config, threads=1)
     resumed.restore(through_a_file(evolved(config, 2).state()))
     assert resumed.evaluations == 16
     assert [record.generation for record in resumed.run()] == [2, 3, 4]
@@ -288,7 +288,7 @@ def test_resumed_is_uninterrupted(name):
 @every_experiment
 def test_a_state_is_a_copy(name):
     config = tiny(name)
-    experiment = Experiment(config, threads=1)
+    experiment = Evolution(config, threads=1)
     run = experiment.run()
     next(run)
     state = experiment.state()
@@ -301,9 +301,9 @@ def test_a_state_is_a_copy(name):
 def test_a_state_of_another_optimizer_is_refused():
     state = evolved(tiny("de-best"), 1).state()
     with pytest.raises(ValueError, match="'ga', got 'de-best'"):
-        Experiment(tiny("ga")).restore(state)
+        Evolution(tiny("ga")).restore(state)
     with pytest.raises(ValueError, match="population"):
-        Experiment(tiny("de-best", population=9)).restore(state)
+        Evolution(tiny("de-best", population=9)).restore(state)
 
 
 @pytest.mark.parametrize("missing", ["records", "best_genomes", "optimizer.fitness"])
@@ -311,13 +311,13 @@ def test_an_incomplete_state_is_refused(missing):
     state = evolved(tiny("ga"), 1).state()
     del state[missing]
     with pytest.raises(ValueError, match=missing.removeprefix("optimizer.")):
-        Experiment(tiny("ga")).restore(state)
+        Evolution(tiny("ga")).restore(state)
 
 
 @pytest.fixture(scope="module")
 def after_two():
     """The state after two generations, and an experiment that it belongs to."""
-    return evolved(tiny("ga"), 2).state(), Experiment(tiny("ga"))
+    return evolved(tiny("ga"), 2).state(), Evolution(tiny("ga"))
 
 
 @pytest.mark.parametrize(
@@ -344,7 +344,7 @@ def test_arrays_that_do_not_belong_together_are_refused(after_two, key, array):
 # starts
 
 
-def starts_of(experiment: Experiment, generations: int) -> list[np.ndarray]:
+def starts_of(experiment: Evolution, generations: int) -> list[np.ndarray]:
     """Distinct starts of each generation, after a look at how they are dealt out."""
     watched = watch(experiment)
     run = experiment.run()
@@ -362,7 +362,7 @@ def starts_of(experiment: Experiment, generations: int) -> list[np.ndarray]:
 def test_every_algorithm_of_a_seed_meets_the_same_starts():
     populations = {"de-best": 8, "de-rand": 9, "ga": 10}
     by_name = [
-        starts_of(Experiment(tiny(name, population=size, trials=3, steps=5)), 3)
+        starts_of(Evolution(tiny(name, population=size, trials=3, steps=5)), 3)
         for name, size in populations.items()
     ]
     for starts in by_name:
@@ -372,9 +372,9 @@ def test_every_algorithm_of_a_seed_meets_the_same_starts():
 def test_starts_differ_between_generations_seeds_and_purposes():
     seen = []
     for seed in (0, 1, 2):
-        experiment = Experiment(tiny("ga", steps=2, seed=seed, trials=5))
+        experiment = Evolution(tiny("ga", steps=2, seed=seed, trials=5))
         seen += starts_of(experiment, 3)
-    space = Experiment(tiny("ga")).space
+    space = Evolution(tiny("ga")).space
     seen += [starts_for_validation(space), starts_for_test(space)]
     poses = np.concatenate(seen)
     assert len(np.unique(poses[:, 0])) == len(poses) == 3 * 3 * 5 + 200 + 1000
@@ -388,7 +388,7 @@ def test_held_out_starts_are_the_same_for_every_run(draw, n):
         tiny("ga", seed=0),
         tiny("de-rand", seed=7, population=9, trials=3, steps=9, hidden=2),
     ]
-    experiments = [Experiment(config) for config in runs]
+    experiments = [Evolution(config) for config in runs]
     # used or not
     list(experiments[0].run())
     fixed = [draw(experiment.space) for experiment in experiments]
@@ -399,6 +399,6 @@ def test_held_out_starts_are_the_same_for_every_run(draw, n):
 
 def test_held_out_starts_suit_the_wheeled_robot_too():
     planar, wheeled = (
-        Experiment(tiny("ga", robot=robot)).space for robot in ("epuck_planar", "epuck")
+        Evolution(tiny("ga", robot=robot)).space for robot in ("epuck_planar", "epuck")
     )
     assert np.array_equal(starts_for_test(planar), starts_for_test(wheeled))

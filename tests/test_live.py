@@ -16,7 +16,7 @@ from evolution.judging.held_out import Judge
 from evolution.replay.viewer import viewer_binary
 from evolution.replay.web import free_ports
 from evolution.run import live
-from evolution.run.__main__ import run
+from evolution.run.__main__ import evolve
 from evolution.run.directory import RunDirectory
 
 ARGUMENTS = ("ga", "--evaluations", "500", "--steps", "15", "--threads", "1")
@@ -84,8 +84,8 @@ def written(path: Path) -> dict[str, bytes]:
 @pytest.mark.slow
 def test_a_viewer_sees_all_generations_and_changes_nothing(viewer, tmp_path):
     process, path = viewer
-    assert run([*ARGUMENTS, "--output", str(tmp_path / "plain")]) == 0
-    assert run([*ARGUMENTS, "--output", str(tmp_path / "live"), "--live"]) == 0
+    assert evolve([*ARGUMENTS, "--output", str(tmp_path / "plain")]) == 0
+    assert evolve([*ARGUMENTS, "--output", str(tmp_path / "live"), "--live"]) == 0
     assert written(tmp_path / "live") == written(tmp_path / "plain")
 
     process.terminate()
@@ -118,7 +118,7 @@ def test_a_viewer_that_goes_away_stops_nothing(viewer, tmp_path, capfd):
     output = tmp_path / "live"
     # long enough for the viewer to go in the middle
     arguments = ["ga", "--evaluations", "1000", "--steps", "60", "--threads", "1"]
-    assert run([*arguments, "--output", str(output), "--live"]) == 0
+    assert evolve([*arguments, "--output", str(output), "--live"]) == 0
     thread.join()
     assert RunDirectory(output).finished
     assert len((output / "history.csv").read_text().splitlines()) == 11
@@ -130,7 +130,7 @@ def test_without_a_viewer_one_line_and_no_directory(monkeypatch, tmp_path):
     monkeypatch.setattr(live, "PORT", port)
     output = tmp_path / "live"
     with pytest.raises(UserError, match=r"no rerun viewer at 127\.0\.0\.1.*rerun"):
-        run([*ARGUMENTS, "--output", str(output), "--live"])
+        evolve([*ARGUMENTS, "--output", str(output), "--live"])
     assert not output.exists()
 
 
@@ -141,7 +141,7 @@ def test_somebody_else_at_the_port_does_not_stop_a_run(monkeypatch, tmp_path, ca
         monkeypatch.setattr(live, "PORT", listener.getsockname()[1])
         before = time.monotonic()
         output = tmp_path / "live"
-        assert run([*ARGUMENTS, "--output", str(output), "--live"]) == 0
+        assert evolve([*ARGUMENTS, "--output", str(output), "--live"]) == 0
         assert RunDirectory(output).finished
         assert time.monotonic() - before < 60
     assert "Traceback" not in capfd.readouterr().err

@@ -22,7 +22,7 @@ from epuck_mj.trials.behaviour_classes import (
     behaviour_classes,
     class_shares,
 )
-from epuck_mj.trials.metrics import Behaviour, behaviour
+from epuck_mj.trials.metrics import Behaviour, behaviour_of
 from epuck_mj.trials.recorder import record_tracks
 from epuck_mj.trials.tracks import Tracks
 
@@ -41,7 +41,7 @@ class Arena:
         self.loops: WallLoops = wall_loops(self.scene, self.probe)
 
     def measure(self, tracks: Tracks, task: TaskParameters = TASK) -> Behaviour:
-        return behaviour(tracks, self.probe.measure(tracks.pose), self.loops, task)
+        return behaviour_of(tracks, self.probe.measure(tracks.pose), self.loops, task)
 
 
 @pytest.fixture(scope="module")
@@ -362,7 +362,7 @@ def test_the_wall_follower_by_hand_is_one(scene):
     robots = MujocoRobots(scene, len(starts))
     tracks = record_tracks(robots, WallFollower(), starts, TASK)
     loops = wall_loops(scene, probe)
-    found = behaviour(tracks, probe.measure(tracks.pose), loops, TASK)
+    found = behaviour_of(tracks, probe.measure(tracks.pose), loops, TASK)
     assert class_shares(found)["wall follower"] > 0.9
     # its target is about 7 mm; corners take it farther off
     assert 0.005 < found.means["clearance_mean"] < 0.01

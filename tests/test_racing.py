@@ -20,7 +20,7 @@ from evolution.judging import evaluation
 from evolution.judging import starts as starts_module
 from evolution.judging.evaluation import ROUNDING, BatchEngine, Race, evaluate
 from evolution.run.champion import choose_champion
-from evolution.run.generation_loop import Experiment
+from evolution.run.generation_loop import Evolution
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from tests.shipped import OPTIMIZERS
@@ -241,13 +241,13 @@ def small(name: str, **update) -> ExperimentConfig:
     return config.model_copy(update=sizes | update)
 
 
-def evolved(config: ExperimentConfig, **how) -> Experiment:
-    experiment = Experiment(config, threads=1, **how)
+def evolved(config: ExperimentConfig, **how) -> Evolution:
+    experiment = Evolution(config, threads=1, **how)
     list(experiment.run())
     return experiment
 
 
-def assert_same(a: Experiment, b: Experiment) -> None:
+def assert_same(a: Evolution, b: Evolution) -> None:
     """Equal to the last bit in all but the cost."""
     assert a.history().encode() == b.history().encode()
     left, right = a.state(), b.state()
@@ -256,7 +256,7 @@ def assert_same(a: Experiment, b: Experiment) -> None:
         np.testing.assert_array_equal(left[key], right[key], err_msg=key)
 
 
-def steps_of(experiment: Experiment) -> list[int]:
+def steps_of(experiment: Evolution) -> list[int]:
     return [each.control_steps for each in experiment.records]
 
 
@@ -326,9 +326,9 @@ def test_a_race_can_be_begun_and_given_up_on_the_way():
     config = small("de-rand", steps=40)
     whole = evolved(config)
     for first in (True, False):
-        begun = Experiment(config, threads=1, racing=first)
+        begun = Evolution(config, threads=1, racing=first)
         list(islice(begun.run(), 5))
-        resumed = Experiment(config, threads=1, racing=not first)
+        resumed = Evolution(config, threads=1, racing=not first)
         resumed.restore(begun.state())
         list(resumed.run())
         assert_same(resumed, whole)

@@ -10,7 +10,7 @@ from rerun.chunk import RrdReader
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.policies.file import ControllerFile, Origin, load
+from epuck_mj.policies.file import ControllerFile, Origin, load_controller
 from epuck_mj.policies.network import Network
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace
@@ -138,7 +138,7 @@ def test_a_champion_is_shown_as_it_evolved_unless_asked_otherwise(champion, here
     assert met is not None
     scene = load_scene("epuck", "arena", config.control_step)
     start = starts_for_test(FreeSpace(scene, 0.01), 1)[0]
-    policy = load(Path(champion)).controller
+    policy = load_controller(Path(champion)).controller
     trial = record(scene, policy, start, TaskParameters(steps=STEPS), met[:1])
     np.testing.assert_allclose(
         next(iter(evolved.poses.values())), trial.pose[:, :2], atol=1e-6
@@ -175,7 +175,7 @@ def test_without_a_display_the_recording_is_beside_the_champion(
 
 def test_the_trial_is_the_one_that_anybody_can_repeat(champion, here, capsys):
     recording = shown(champion)
-    policy, task = load(champion).controller, TaskParameters(steps=STEPS)
+    policy, task = load_controller(champion).controller, TaskParameters(steps=STEPS)
     start = starts_for_test(FreeSpace(load_scene("epuck", "arena"), 0.01), 1)[0]
     trajectory = record(load_scene("epuck", "arena"), policy, start, task)
     (poses,) = recording.poses.values()
@@ -236,7 +236,7 @@ def test_a_pose(champion, pose):
     scene, task = load_scene("epuck", "arena"), TaskParameters(steps=STEPS)
     x, y, degrees = map(float, pose)
     start = np.array([x, y, np.radians(degrees)])
-    trajectory = record(scene, load(champion).controller, start, task)
+    trajectory = record(scene, load_controller(champion).controller, start, task)
     np.testing.assert_allclose(poses, trajectory.pose[:, :2], atol=1e-6)
 
 

@@ -24,14 +24,14 @@ from rerun.chunk import RrdReader
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.policies import file as controller_file
+from epuck_mj.policies.file import load_controller
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.trials.trajectory import Trajectory
 from evolution.judging import starts
 from evolution.judging.held_out import Judge
 from evolution.run import execution, results
-from evolution.run.__main__ import run
+from evolution.run.__main__ import evolve
 from evolution.run.directory import LOCK
 from evolution.run.generation_loop import HISTORY
 from evolution.settings.config import ExperimentConfig
@@ -168,7 +168,7 @@ def refusal(here, capfd):
     def refused(*argv: str) -> str:
         before = tree(here)
         with pytest.raises(UserError) as info:
-            run(argv)
+            evolve(argv)
         message = str(info.value)
         assert message.strip()
         assert "\n" not in message
@@ -195,7 +195,7 @@ def reference(tmp_path_factory):
     directory = tmp_path_factory.mktemp("reference") / "run"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(results, "_show", lambda *_: None)
-        assert run(["ga", "--seed", "7", *LONG, "--output", str(directory)]) == 0
+        assert evolve(["ga", "--seed", "7", *LONG, "--output", str(directory)]) == 0
     return directory
 
 
@@ -281,7 +281,7 @@ def test_the_checkpoint_holds_every_generation(finished):
 
 def test_the_champions_file_pictures_and_recordings_can_be_read(finished):
     directory, _ = finished
-    stored = controller_file.load(directory / "champion.json")
+    stored = load_controller(directory / "champion.json")
     assert stored.genome.shape == (40,)
     assert set(stored.scores["held_out"]) == {"epuck_planar", "epuck"}
     assert 1 <= Trajectory.load(directory / "trajectory.npz").steps <= 20
@@ -294,7 +294,7 @@ def test_the_champions_file_pictures_and_recordings_can_be_read(finished):
 
 def test_the_summary_is_in_plain_words(finished):
     directory, process = finished
-    scores = controller_file.load(directory / "champion.json").scores
+    scores = load_controller(directory / "champion.json").scores
     first, fresh, stored, written, replay = process.stdout.splitlines()
     assert re.fullmatch(
         r"ga, seed 7: 60 evaluations in 6 generations, \d+ min \d+ s", first
@@ -342,8 +342,8 @@ def test_own_yaml_default_output_and_the_same_seed_twice(finished, tmp_path):
 
 
 def test_default_output_is_named_by_experiment_and_seed(here, quick):
-    assert run(["de-rand", "--seed", "3", *SHORT]) == 0
-    assert run(SHORT) == 0
+    assert evolve(["de-rand", "--seed", "3", *SHORT]) == 0
+    assert evolve(SHORT) == 0
     names = sorted(path.name for path in (here / "runs").iterdir())
     assert names == ["de-best-seed-1", "de-rand-seed-3"]
 
@@ -361,11 +361,11 @@ def test_print_config_writes_nothing_and_loads_back(tmp_path):
 
 @pytest.mark.parametrize("name", OPTIMIZERS)
 def test_print_config_of_a_shipped_experiment(name, here, capsys):
-    assert run([name, "--print-config"]) == 0
+    assert evolve([name, "--print-config"]) == 0
     assert capsys.readouterr().out == load_config(find_config(name)).to_yaml()
     # a printed config is an experiment: the same again
     (here / "mine.yaml").write_text(load_config(find_config(name)).to_yaml())
-    assert run(["mine.yaml", "--print-config"]) == 0
+    assert evolve(["mine.yaml", "--print-config"]) == 0
     assert capsys.readouterr().out == load_config(find_config(name)).to_yaml()
 
 
@@ -373,7 +373,7 @@ def test_a_flag_wins_over_the_yaml(here, capsys):
     text = (CONFIGS / "ga.yaml").read_text() + "seed: 5\nbiases: false\n"
     (here / "mine.yaml").write_text(text)
     flags = "--seed 6 --biases --control-step 0.2 --mutation 0.5 --robot epuck"
-    assert run(["mine.yaml", *flags.split(), "--print-config"]) == 0
+    assert evolve(["mine.yaml", *flags.split(), "--print-config"]) == 0
     printed = yaml.safe_load(capsys.readouterr().out)
     assert (printed["seed"], printed["biases"]) == (6, True)
     assert (printed["control_step"], printed["robot"]) == (0.2, "epuck")
@@ -385,7 +385,7 @@ def test_a_measured_robot_is_a_flag(here, capsys):
     robot = Calibration(track=0.055)
     robot.save(here / "robot.yaml")
     flags = ["ga", "--calibration", "robot.yaml", "--print-config"]
-    assert run([*flags, "--noise", "calibrated"]) == 0
+    assert evolve([*flags, "--noise", "calibrated"]) == 0
     printed = ExperimentConfig.from_yaml(capsys.readouterr().out, "printed")
     assert printed.calibration == robot
     # and one of the YAML's can be taken away
@@ -397,24 +397,24 @@ def test_a_measured_robot_is_a_flag(here, capsys):
         "none",
     ]
     (here / "mine.yaml").write_text(printed.to_yaml())
-    assert run([*printed_again, "--print-config"]) == 0
+    assert evolve([*printed_again, "--print-config"]) == 0
     without = ExperimentConfig.from_yaml(capsys.readouterr().out, "printed")
     assert without == load_config(find_config("ga"))
     message = "^calibration needs noise: calibrated or strong, got none$"
     with pytest.raises(UserError, match=message):
-        run(flags)
+        evolve(flags)
 
 
 def test_help_ends_well(capsys):
     with pytest.raises(SystemExit) as info:
-        run(["ga", "--help"])
+        evolve(["ga", "--help"])
     assert not info.value.code
     assert "--tournament" in capsys.readouterr().out
 
 
 def test_resume_of_a_finished_run_changes_nothing(finished, here, capsys):
     before = tree(finished[0])
-    assert run(["--resume", str(finished[0])]) == 0
+    assert evolve(["--resume", str(finished[0])]) == 0
     assert "is finished; Replay: " in capsys.readouterr().out
     assert tree(finished[0]) == before
 
@@ -423,30 +423,30 @@ def test_a_run_on_an_own_robot_of_another_name(here, quick, capsys):
     shutil.copy(MODELS / "epuck_planar.xml", here / "mine.xml")
     (here / "out").mkdir()
     # an empty directory is as good as none
-    assert run(["ga", *SHORT, "--robot", "mine.xml", "--output", "out"]) == 0
+    assert evolve(["ga", *SHORT, "--robot", "mine.xml", "--output", "out"]) == 0
     out = capsys.readouterr().out
     assert "fresh starts: mine.xml " in out
     assert "crash), epuck " in out
-    origin = controller_file.load("out/champion.json").origin
+    origin = load_controller("out/champion.json").origin
     assert origin.robot == str(here / "mine.xml")
     assert set(origin.mjcf_sha256) == {"arena", "robot"}
     # the same robot by its name is the same run
-    assert run(["ga", *SHORT, "--output", "named"]) == 0
+    assert evolve(["ga", *SHORT, "--output", "named"]) == 0
     history = (here / "named" / "history.csv").read_bytes()
     assert (here / "out" / "history.csv").read_bytes() == history
 
 
 def test_the_wheeled_robot_is_tested_on_the_plane_as_well(here, quick, capsys):
-    assert run(["ga", *SHORT, "--robot", "epuck", "--output", "out"]) == 0
+    assert evolve(["ga", *SHORT, "--robot", "epuck", "--output", "out"]) == 0
     out = capsys.readouterr().out
     assert out.count("Held-out fitness") == 1
-    tests = controller_file.load("out/champion.json").scores["held_out"]
+    tests = load_controller("out/champion.json").scores["held_out"]
     assert list(tests) == ["epuck", "epuck_planar"]
 
 
 def test_the_engine_changes_nothing(here, quick):
     for engine in ("batch", "dm_control"):
-        assert run(["ga", *SHORT, "--engine", engine, "--output", engine]) == 0
+        assert evolve(["ga", *SHORT, "--engine", engine, "--output", engine]) == 0
     assert_reproduced(here / "dm_control", here / "batch")
 
 
@@ -604,7 +604,7 @@ def test_resume_and_output_together_are_refused(refusal, unfinished):
 
 
 def test_the_same_config_by_its_flags_can_be_resumed(unfinished, finished, quick):
-    assert run(["ga", "--seed", "7", *TINY, "--resume", "run"]) == 0
+    assert evolve(["ga", "--seed", "7", *TINY, "--resume", "run"]) == 0
     history = (unfinished / "history.csv").read_bytes()
     assert history == (finished[0] / "history.csv").read_bytes()
 
@@ -629,7 +629,7 @@ def test_a_checkpoint_of_another_algorithm_or_size_is_refused(
     path = unfinished / "checkpoint.npz"
     for argv in (["de-best", *SHORT], ["ga", *SHORT, "--population", "12"]):
         other = f"other-{len(argv)}"
-        assert run([*argv, "--output", other]) == 0
+        assert evolve([*argv, "--output", other]) == 0
         capfd.readouterr()
         shutil.copy(here / other / "checkpoint.npz", path)
         assert "not a checkpoint of this run" in refusal("--resume", "run")
@@ -706,7 +706,7 @@ def test_a_signal_ends_the_run_and_says_how_to_resume(
     # no half-written file
     assert not files.leftovers(directory)
     monkeypatch.chdir(tmp_path)
-    assert run(resume_command(stderr)) == 0
+    assert evolve(resume_command(stderr)) == 0
     assert_reproduced(directory, reference)
     provenance = json.loads((directory / "provenance.json").read_text())
     assert provenance["argv"] == argv
@@ -765,7 +765,7 @@ def test_resume_from_between_any_two_writes(here, quick, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(files, "write_bytes", watched)
-        assert run(["ga", *SHORT, "--output", "whole"]) == 0
+        assert evolve(["ga", *SHORT, "--output", "whole"]) == 0
     assert [name for name, _ in moments] == [
         "config.yaml",
         "provenance.json",
@@ -774,7 +774,7 @@ def test_resume_from_between_any_two_writes(here, quick, monkeypatch):
         "provenance.json",
     ]
     for _, moment in moments:
-        assert run(["--resume", moment]) == 0
+        assert evolve(["--resume", moment]) == 0
         assert_reproduced(here / moment, here / "whole")
         assert n_records(here / moment) == 2
 
@@ -783,7 +783,7 @@ def test_a_full_disk_leaves_what_was_there(
     here, quick, every_generation_saved, monkeypatch
 ):
     argv = ["ga", *TINY, "--output"]
-    assert run([*argv, "whole"]) == 0
+    assert evolve([*argv, "whole"]) == 0
     sync, calls = os.fsync, []
 
     def full(handle: int) -> None:
@@ -796,21 +796,21 @@ def test_a_full_disk_leaves_what_was_there(
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", full)
         with pytest.raises(UserError, match=r"No space left .* --resume run$"):
-            run([*argv, "run"])
+            evolve([*argv, "run"])
     names = {"config.yaml", "provenance.json", "checkpoint.npz", "history.csv"}
     names |= {"best_individuals.npz", "timing.csv", LOCK}
     assert {path.name for path in (here / "run").iterdir()} == names
     assert (n_records(here / "run"), n_rows(here / "run")) == (1, 1)
-    assert run(["--resume", "run"]) == 0
+    assert evolve(["--resume", "run"]) == 0
     assert_reproduced(here / "run", here / "whole")
 
 
 def test_a_run_that_has_only_its_config_can_be_resumed(here, quick):
     argv = ["ga", *SHORT]
-    assert run([*argv, "--output", "whole"]) == 0
+    assert evolve([*argv, "--output", "whole"]) == 0
     (here / "begun").mkdir()
     shutil.copy("whole/config.yaml", "begun")
-    assert run(["--resume", "begun"]) == 0
+    assert evolve(["--resume", "begun"]) == 0
     assert_reproduced(here / "begun", here / "whole")
     provenance = json.loads((here / "begun" / "provenance.json").read_text())
     assert provenance["finished"]
@@ -820,7 +820,7 @@ def test_resume_from_another_directory(unfinished, finished, quick, monkeypatch)
     elsewhere = unfinished.parent / "else" / "where"
     elsewhere.mkdir(parents=True)
     monkeypatch.chdir(elsewhere)
-    assert run(["--resume", "../../run"]) == 0
+    assert evolve(["--resume", "../../run"]) == 0
     assert not any(elsewhere.iterdir())
     assert json.loads((unfinished / "provenance.json").read_text())["finished"]
     history = (unfinished / "history.csv").read_bytes()
@@ -886,7 +886,7 @@ def test_an_arena_that_the_wheeled_robot_cannot_use_is_refused_first(refusal, he
 
 
 def test_a_checkpoint_of_another_seed_is_refused(refusal, unfinished, quick, capfd):
-    assert run(["ga", *TINY, "--seed", "8", "--output", "other"]) == 0
+    assert evolve(["ga", *TINY, "--seed", "8", "--output", "other"]) == 0
     capfd.readouterr()
     shutil.copy("other/checkpoint.npz", "run")
     refusal("--resume", "run")
@@ -895,7 +895,7 @@ def test_a_checkpoint_of_another_seed_is_refused(refusal, unfinished, quick, cap
 def test_a_robot_changed_since_is_refused_on_resume(refusal, here, quick, capfd):
     (here / "mine.xml").write_text(FULL)
     argv = ["ga", *SHORT, "--robot", "mine.xml"]
-    assert run([*argv, "--evaluations", "10", "--output", "run"]) == 0
+    assert evolve([*argv, "--evaluations", "10", "--output", "run"]) == 0
     stored = json.loads((here / "run" / "provenance.json").read_text())
     (here / "run" / "provenance.json").write_text(
         json.dumps({**stored, "finished": None})
@@ -907,22 +907,22 @@ def test_a_robot_changed_since_is_refused_on_resume(refusal, here, quick, capfd)
 
 def test_a_run_on_an_own_robot_can_be_resumed_from_elsewhere(here, quick, monkeypatch):
     (here / "mine.xml").write_text(FULL)
-    assert run(["ga", *SHORT, "--robot", "mine.xml", "--output", "run"]) == 0
+    assert evolve(["ga", *SHORT, "--robot", "mine.xml", "--output", "run"]) == 0
     (here / "run" / "provenance.json").unlink()
     (here / "else").mkdir()
     monkeypatch.chdir(here / "else")
-    assert run(["--resume", "../run"]) == 0
+    assert evolve(["--resume", "../run"]) == 0
 
 
 def test_a_run_killed_while_it_wrote_its_config_can_be_started_again(here, quick):
     (here / "run").mkdir()
     (here / "run" / ".config.yaml-b2q7x_1c.tmp").write_text("seed: 7")
-    assert run(["ga", *SHORT, "--output", "run"]) == 0
+    assert evolve(["ga", *SHORT, "--output", "run"]) == 0
 
 
 def test_leftovers_of_a_kill_are_not_shown(unfinished, quick, capsys):
     (unfinished / ".checkpoint.npz-b2q7x_1c.tmp").write_bytes(b"PK")
-    assert run(["--resume", "run"]) == 0
+    assert evolve(["--resume", "run"]) == 0
     assert "b2q7x_1c.tmp" not in capsys.readouterr().out
 
 
@@ -937,7 +937,7 @@ def test_what_cannot_be_written_later_is_a_user_error(name, unfinished, quick):
     (unfinished / name).unlink(missing_ok=True)
     (unfinished / name).mkdir()
     with pytest.raises(UserError, match=name):
-        run(["--resume", "run"])
+        evolve(["--resume", "run"])
 
 
 @pytest.mark.parametrize("flag", ["", "--robot", "--output"])

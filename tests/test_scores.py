@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from epuck_mj.errors import UserError
-from epuck_mj.policies import file as controller_file
+from epuck_mj.policies.file import load_controller
 from evolution.judging.scores import KnownScores, Scores
 
 RESULTS = Path(__file__).resolve().parent.parent / "results"
@@ -40,7 +40,7 @@ def full() -> dict:
 def test_every_shipped_champion_comes_back_byte_for_byte():
     assert len(CHAMPIONS) > 80
     for path in CHAMPIONS:
-        champion = controller_file.load(path)
+        champion = load_controller(path)
         scores = Scores.read(champion.scores, path)
         again = replace(champion, scores=scores.to_dict())
         assert again.to_json().encode() == path.read_bytes(), path

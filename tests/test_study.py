@@ -22,7 +22,7 @@ from epuck_mj.host import files
 from evolution.judging import starts
 from evolution.judging.held_out import Judge
 from evolution.run import execution, results
-from evolution.run.__main__ import run
+from evolution.run.__main__ import evolve
 from evolution.run.directory import LOCK, RunDirectory
 from evolution.run.means import Means
 from evolution.settings.config_files import load_config
@@ -207,7 +207,7 @@ def reference(tmp_path_factory):
         for seed in SEEDS:
             argv = [str(cwd / "one.yaml"), "--seed", str(seed)]
             output = ["--output", str(cwd / f"seed-{seed}")]
-            assert run([*argv, "--evaluations", str(LONG), *output]) == 0
+            assert evolve([*argv, "--evaluations", str(LONG), *output]) == 0
     return cwd
 
 
@@ -224,7 +224,7 @@ def test_every_run_is_the_same_as_alone(here, monkeypatch):
     for name, seed in RUNS:
         alone = here / f"{name}-{seed}"
         argv = [f"{name}.yaml", "--seed", str(seed), "--output", str(alone)]
-        assert run(argv) == 0
+        assert evolve(argv) == 0
         there = out / name / f"seed-{seed}"
         assert_reproduced(there, alone)
         assert load_config(there / "config.yaml") == load_config(alone / "config.yaml")
@@ -560,7 +560,7 @@ def held(directory: Path, seconds: float = PATIENCE) -> Iterator[subprocess.Pope
 
 def test_a_second_process_in_a_run_directory_gets_one_line(here, carried, monkeypatch):
     argv = ["one.yaml", "--output", "run"]
-    assert run(argv) == 0
+    assert evolve(argv) == 0
     directory = here / "run"
     text = json.dumps({**provenance(directory), "finished": None})
     (directory / "provenance.json").write_text(text)
@@ -570,7 +570,7 @@ def test_a_second_process_in_a_run_directory_gets_one_line(here, carried, monkey
     with held(directory) as process:
         before = written(directory)
         for act in (
-            lambda: run(["--resume", "run"]),
+            lambda: evolve(["--resume", "run"]),
             lambda: carry_out(job, Means(), lambda evaluations: None),
         ):
             with pytest.raises(UserError) as info:
@@ -582,7 +582,7 @@ def test_a_second_process_in_a_run_directory_gets_one_line(here, carried, monkey
         # however it ends, the directory is free
         process.kill()
         process.wait(PATIENCE)
-        assert run(["--resume", "run"]) == 0
+        assert evolve(["--resume", "run"]) == 0
 
 
 def test_a_process_about_to_leave_is_waited_for(tmp_path):
@@ -603,23 +603,23 @@ def test_checkpoints_take_a_small_share_of_the_time(here, carried, monkeypatch):
             return now
 
     class Directory(RunDirectory):
-        def save(self, experiment, seconds):
+        def save(self, evolution, seconds):
             nonlocal now
-            super().save(experiment, seconds)
-            saves.append((len(experiment.records), list(seconds)))
+            super().save(evolution, seconds)
+            saves.append((len(evolution.records), list(seconds)))
             now += 2
 
     config = load_config(here / "one.yaml").model_copy(update={"evaluations": 1000})
     evolution = execution.Run(config, Directory(here / "run"), Means(), ())
     monkeypatch.setattr(execution, "time", Clock)
-    evaluate = evolution.experiment.engine.run
+    evaluate = evolution.evolution.engine.run
 
     def slow(*arguments):
         nonlocal now
         now += 1
         return evaluate(*arguments)
 
-    monkeypatch.setattr(evolution.experiment.engine, "run", slow)
+    monkeypatch.setattr(evolution.evolution.engine, "run", slow)
     evolution.start()
     assert len(list(evolution.evolve())) == 100
     # the first, so that there is one, and the last; 5 % of 41 s is more than 2 s

@@ -13,7 +13,7 @@ from epuck_mj.bridge.line.serial_port import ports
 from epuck_mj.constants import SPEED_MAX
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse
-from epuck_mj.policies.file import load
+from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import Policy, TaskParameters
@@ -112,7 +112,7 @@ def _champion(name: str) -> tuple[Policy, TaskParameters, str, str]:
     """A policy, its task, the robot and arena it is for."""
     if name == YARDSTICK:
         return WallFollower(), TaskParameters(), "epuck", "arena"
-    file = load(name)
+    file = load_controller(name)
     return file.controller, file.task, file.origin.robot, file.origin.arena
 
 

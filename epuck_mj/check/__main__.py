@@ -29,7 +29,7 @@ class Options:
     """PNG to write: the walls from above, and where robots may start"""
 
 
-def run(argv: Sequence[str]) -> int:
+def check(argv: Sequence[str]) -> int:
     """Check and print; the exit status.
 
     Raises:
@@ -57,4 +57,4 @@ def run(argv: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
-    main(run)
+    main(check)

@@ -14,7 +14,7 @@ from epuck_mj.check.findings import Finding, Place, Severity, Unusable, error
 from epuck_mj.check.parts import part_findings
 from epuck_mj.check.rest import rest_findings
 from epuck_mj.check.room import room_findings
-from epuck_mj.check.source import TOPIC, Source, compiled, read
+from epuck_mj.check.source import TOPIC, Source, compiled_source, read
 from epuck_mj.check.speed import speed_findings
 from epuck_mj.check.walls import finite_findings, plane_findings, wall_findings
 from epuck_mj.errors import UserError
@@ -78,7 +78,7 @@ def _check(arena: Path, robot: str) -> Report:
     scene = grid = None
     try:
         source = read(arena, find_robot(robot))
-        model, places = compiled(source)
+        model, places = compiled_source(source)
         findings += finite_findings(model, places) or plane_findings(model, places)
         if not findings:
             scene = _scene(source, robot)

@@ -86,7 +86,7 @@ def read(arena: Path, robot: Path) -> Source:
     return Source("\n".join(whole.lines), tuple(whole.elements), scene)
 
 
-def compiled(source: Source) -> tuple[mujoco.MjModel, tuple[Place, ...]]:
+def compiled_source(source: Source) -> tuple[mujoco.MjModel, tuple[Place, ...]]:
     """The scene's model, and where each of its geoms was written.
 
     Raises:

@@ -99,7 +99,7 @@ def main(run: Callable[[Sequence[str]], int]) -> None:
     sys.exit(status)
 
 
-def command(module: str, *arguments: str | Path) -> str:
+def shell_command(module: str, *arguments: str | Path) -> str:
     """The line that runs a module of ours, as a person would type it here."""
     python = Path(sys.executable)
     if python.is_relative_to(Path.cwd()):

@@ -115,7 +115,7 @@ class ControllerFile:
         return cls(network, genome, task, origin, fields["scores"])
 
 
-def load(path: str | Path) -> ControllerFile:
+def load_controller(path: str | Path) -> ControllerFile:
     """The controller stored at `path`.
 
     Raises:

@@ -42,7 +42,7 @@ CORNER_CUT = 2 * (PROXIMITY_RANGE - LOOP_CLEARANCE)
 
 
 @dataclass(frozen=True, eq=False)
-class Progress:
+class LoopProgress:
     """Ways of `(n,)` robots along `(loops,)` loops.
 
     Attributes:
@@ -71,7 +71,7 @@ class WallLoops:
     arc: np.ndarray
     length: np.ndarray
 
-    def progress(self, poses: np.ndarray, near: np.ndarray) -> Progress:
+    def progress(self, poses: np.ndarray, near: np.ndarray) -> LoopProgress:
         """How far robots came along the walls.
 
         Args:
@@ -92,7 +92,7 @@ class WallLoops:
         along &= np.abs(step) <= DETOUR_MAX * driven + CORNER_CUT
         net = np.zeros((len(poses), self.length.size))
         np.add.at(net, (robot[1:][along], loop[1:][along]), step[along])
-        return Progress(net, self._visited(robot, loop, arc, len(poses)))
+        return LoopProgress(net, self._visited(robot, loop, arc, len(poses)))
 
     def _visited(
         self, robot: np.ndarray, loop: np.ndarray, arc: np.ndarray, n: int

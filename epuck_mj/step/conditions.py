@@ -13,8 +13,8 @@ from epuck_mj.step.disturbances import (
     NOISE,
     RANGES,
     Disturbances,
-    calibrated,
-    draw,
+    draw_calibrated,
+    draw_disturbances,
 )
 
 NoiseLevel = Literal["none", "calibrated", "strong"]
@@ -55,8 +55,10 @@ class Conditions:
         if level is None:
             return None
         if self.calibration is not None:
-            return calibrated(self.calibration, rng, n, steps, level)
-        return draw(rng, n, steps, level, RANGES if self.randomise else BOOK)
+            return draw_calibrated(self.calibration, rng, n, steps, level)
+        return draw_disturbances(
+            rng, n, steps, level, RANGES if self.randomise else BOOK
+        )
 
     @classmethod
     def asked(

@@ -149,7 +149,7 @@ class Disturbances:
         return self[np.tile(np.arange(len(self)), times)]
 
 
-def draw(
+def draw_disturbances(
     rng: np.random.Generator,
     n: int,
     steps: int,
@@ -182,7 +182,7 @@ def draw(
     )
 
 
-def calibrated(
+def draw_calibrated(
     calibration: Calibration,
     rng: np.random.Generator,
     n: int,
@@ -203,7 +203,7 @@ def calibrated(
     gains = np.tile(calibration.gains, (n, 1))
     wheels = np.array(calibration.wheel_radii) / WHEEL_RADIUS
     return replace(
-        draw(rng, n, steps, noise),
+        draw_disturbances(rng, n, steps, noise),
         gains=gains,
         known_gains=gains,
         wheel_gains=np.tile(wheels, (n, 1)),

@@ -102,7 +102,7 @@ class Behaviour:
         return {name: _mean_of(value) for name, value in values.items()}
 
 
-def behaviour(
+def behaviour_of(
     tracks: Tracks, clearance: Clearance, loops: WallLoops, task: TaskParameters
 ) -> Behaviour:
     """Metrics of trials.

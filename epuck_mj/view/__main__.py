@@ -18,7 +18,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse
 from epuck_mj.host.files import is_file
 from epuck_mj.host.yaml_and_json import read_yaml
-from epuck_mj.policies.file import load
+from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.conditions import Conditions, NoiseLevel
@@ -54,7 +54,7 @@ class Options:
     """file of python -m epuck_mj.calibrate: that robot in all trials; needs noise"""
 
 
-def run(argv: Sequence[str]) -> int:
+def view(argv: Sequence[str]) -> int:
     """Watch; the exit status.
 
     Raises:
@@ -65,7 +65,7 @@ def run(argv: Sequence[str]) -> int:
     task = TaskParameters()
     conditions = Conditions.asked(options.noise, options.randomise, options.calibration)
     if options.champion is not None:
-        file = load(options.champion)
+        file = load_controller(options.champion)
         policy, task = file.controller, file.task
         conditions = conditions or _evolved_with(options.champion)
     if options.seconds is not None:
@@ -138,4 +138,4 @@ def _starts(scene: "Scene", options: Options) -> Iterator[np.ndarray]:
 
 
 if __name__ == "__main__":
-    main(run)
+    main(view)

@@ -16,7 +16,7 @@ from epuck_mj.scene.wall_loops import wall_loops
 from epuck_mj.step.control import Everybody, Policy, TaskParameters
 from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.trials.behaviour_classes import class_shares
-from epuck_mj.trials.metrics import behaviour
+from epuck_mj.trials.metrics import behaviour_of
 from epuck_mj.trials.recorder import record_tracks
 from evolution.judging.evaluation import CAPACITY
 from evolution.judging.scores import HeldOut
@@ -121,7 +121,7 @@ class Judge:
         everybody, starts = Everybody(policy), self.starts(n)
         tracks = record_tracks(robots, everybody, starts, self._task, disturbances)
         clearance = self._probe.measure(tracks.pose)
-        did = behaviour(tracks, clearance, self._loops, self._task)
+        did = behaviour_of(tracks, clearance, self._loops, self._task)
         fitness = tracks.trial_fitness
         interval = mean_interval(fitness, np.random.default_rng(INTERVAL_SEED))
         return HeldOut(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from epuck_mj.host.command_line import command
+from epuck_mj.host.command_line import shell_command
 from epuck_mj.host.files import writing
 from epuck_mj.scene.model import Scene
 from epuck_mj.show.recording import Trial, save_recording
@@ -58,7 +58,7 @@ def show(options: Options, replay: Replay, path: str) -> None:
     trajectories = [trial.trajectory for trial in replay.trials]
     if options.save is not None:
         replay.save(options.save)
-        print(f"{options.save}; watch it: {command('rerun', options.save)}")
+        print(f"{options.save}; watch it: {shell_command('rerun', options.save)}")
     if options.image is not None:
         _draw(options.image, replay.scene, trajectories)
         print(options.image)
@@ -77,7 +77,7 @@ def show(options: Options, replay: Replay, path: str) -> None:
 
 def _open(recording: Path) -> None:
     """The viewer, or how to get one."""
-    how = f"watch it: {command('rerun', recording)}"
+    how = f"watch it: {shell_command('rerun', recording)}"
     if not display_there():
         print(f"{recording}; there is no display here; {how}")
     elif reason := open_viewer(recording):

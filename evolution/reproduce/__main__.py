@@ -10,7 +10,7 @@ from pathlib import Path
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.host.command_line import command, main, parse
+from epuck_mj.host.command_line import main, parse, shell_command
 from epuck_mj.step.fitness import STEP_FITNESS
 from evolution.report.__main__ import report_study
 from evolution.study.__main__ import study
@@ -91,7 +91,7 @@ def reproduce_paper(argv: Sequence[str]) -> int:
         unevolved = []
     wheels = others[0] if others else None
     text = reproduction(
-        main_study, wheels, unevolved, command("evolution.reproduce", *argv)
+        main_study, wheels, unevolved, shell_command("evolution.reproduce", *argv)
     )
     path = options.output / "REPRODUCTION.md"
     with files.writing():

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from evolution.judging.held_out import Judge
-from evolution.run.generation_loop import Experiment
+from evolution.run.generation_loop import Evolution
 from evolution.settings.config import ExperimentConfig
 
 FRESH_STARTS = 100
@@ -41,10 +41,10 @@ def first_generation(config: ExperimentConfig, fitness: str) -> FirstGeneration:
         UserError: if robot or arena cannot be used.
     """
     config = config.model_copy(update={"fitness": fitness})
-    experiment = Experiment(config)
-    record = next(experiment.run())
-    judge = Judge(experiment.scene, experiment.space, config.task)
-    best = config.network.decode(experiment.best_genomes[0])
+    evolution = Evolution(config)
+    record = next(evolution.run())
+    judge = Judge(evolution.scene, evolution.space, config.task)
+    best = config.network.decode(evolution.best_genomes[0])
     test = judge.test(best, FRESH_STARTS)
     return FirstGeneration(
         fitness, record.evaluations, record.best, test.mean, test.behaviour

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import tyro
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import check_threads, command, main, parse
+from epuck_mj.host.command_line import check_threads, main, parse, shell_command
 from epuck_mj.host.interruption import Interrupted, Interruption
 from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
@@ -58,7 +58,7 @@ class Options:
     print_config: bool = False
 
 
-def run(argv: Sequence[str]) -> int:
+def evolve(argv: Sequence[str]) -> int:
     """Run the command line; its exit status.
 
     Raises:
@@ -89,10 +89,10 @@ def run(argv: Sequence[str]) -> int:
     from evolution.run.means import Means
 
     means = Means(options.engine, options.threads, options.racing)
-    evolution = Run(options.config, directory, means, argv)
+    run = Run(options.config, directory, means, argv)
     with directory.locked():
         if options.resume is not None:
-            differing = evolution.resume()
+            differing = run.resume()
             if differing:
                 print(
                     f"warning: {', '.join(differing)} differ from where this run began "
@@ -100,8 +100,8 @@ def run(argv: Sequence[str]) -> int:
                     file=sys.stderr,
                 )
         else:
-            evolution.start()
-        return _carry_out(evolution, options.live)
+            run.start()
+        return _carry_out(run, options.live)
 
 
 def _options(argv: Sequence[str]) -> Options:
@@ -118,9 +118,8 @@ def _options(argv: Sequence[str]) -> Options:
     default = Options(experiment, config)
     options = parse(Options, f"python -m {MODULE}", argv, default)
     if options.experiment != experiment:
-        raise UserError(
-            f"the experiment comes first: {command(MODULE, options.experiment, '...')}"
-        )
+        first = shell_command(MODULE, options.experiment, "...")
+        raise UserError(f"the experiment comes first: {first}")
     # a run can be resumed from anywhere
     options = replace(options, config=options.config.located())
     if options.resume is not None and options.output is not None:
@@ -128,55 +127,55 @@ def _options(argv: Sequence[str]) -> Options:
     return options
 
 
-def _carry_out(evolution: "Run", live: bool) -> int:
+def _carry_out(run: "Run", live: bool) -> int:
     """Evolve, then choose and show the champion; the exit status."""
-    experiment, directory = evolution.experiment, evolution.directory
+    evolution, directory = run.evolution, run.directory
     started = time.monotonic()
     with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:
         try:
             with interruption.raising():
-                scores = _finished(evolution, live)
+                scores = _finished(run, live)
         except Interrupted:
             print(
                 f"Interrupted after {directory.evaluations():,} evaluations; go on "
-                f"with: {command(MODULE, '--resume', directory.path)}",
+                f"with: {shell_command(MODULE, '--resume', directory.path)}",
                 file=sys.stderr,
             )
             return interruption.status
     minutes, seconds = divmod(round(time.monotonic() - started), 60)
     print(
-        f"{experiment.optimizer.name}, seed {experiment.config.seed}: "
-        f"{experiment.evaluations:,} evaluations in {len(experiment.records)} "
+        f"{evolution.optimizer.name}, seed {evolution.config.seed}: "
+        f"{evolution.evaluations:,} evaluations in {len(evolution.records)} "
         f"generations, {minutes} min {seconds} s"
     )
-    print(scores.in_lines(experiment.config.steps))
+    print(scores.in_lines(evolution.config.steps))
     print(f"Written to {directory.path}: {directory.contents()}")
     print(_replay(directory))
     return 0
 
 
-def _finished(evolution: "Run", live: bool) -> Scores:
+def _finished(run: "Run", live: bool) -> Scores:
     """Scores of the champion, once evolved and chosen."""
     from evolution.run.live import Live
     from evolution.run.progress import Progress
 
-    experiment = evolution.experiment
-    budget = experiment.config.evaluations
+    evolution = run.evolution
+    budget = evolution.config.evaluations
     with (
-        Live(experiment) if live else nullcontext() as view,
-        Progress(budget, experiment.evaluations) as progress,
+        Live(evolution) if live else nullcontext() as view,
+        Progress(budget, evolution.evaluations) as progress,
     ):
-        for record in evolution.evolve():
+        for record in run.evolve():
             progress.update(record)
             if view is not None:
                 view.update()
     print("Choosing the champion on fresh starts ...", file=sys.stderr)
-    return evolution.finish()
+    return run.finish()
 
 
 def _replay(directory: RunDirectory) -> str:
-    return f"Replay: {command('evolution.replay', directory.path)}"
+    return f"Replay: {shell_command('evolution.replay', directory.path)}"
 
 
 if __name__ == "__main__":
-    main(run)
+    main(evolve)

@@ -11,7 +11,7 @@ import numpy as np
 
 from evolution.judging.evaluation import Engine, evaluate
 from evolution.judging.starts import held_out_disturbances, starts_for_validation
-from evolution.run.generation_loop import Experiment
+from evolution.run.generation_loop import Evolution
 from evolution.settings.randomness import Purpose
 
 BEST_OF_POPULATION = 0.1
@@ -36,16 +36,16 @@ class Champion:
     validation_fitness: float
 
 
-def candidates(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
+def candidates(evolution: Evolution) -> tuple[np.ndarray, np.ndarray]:
     """Genomes `(n, genes)` that may be champion and their stored fitness `(n,)`."""
-    population, fitness = experiment.optimizer.population, experiment.optimizer.fitness
+    population, fitness = evolution.optimizer.population, evolution.optimizer.fitness
     n_best = max(1, round(BEST_OF_POPULATION * len(population)))
     order = np.argsort(-fitness, kind="stable")[:n_best]
     # the generations that raised the run's best
-    best = np.array([record.best for record in experiment.records])
+    best = np.array([record.best for record in evolution.records])
     before = np.concatenate([[-np.inf], np.maximum.accumulate(best)[:-1]])
     raised = np.flatnonzero(best > before)[-LATEST_BEST:]
-    genomes = [population[order], np.array(experiment.best_genomes)[raised]]
+    genomes = [population[order], np.array(evolution.best_genomes)[raised]]
     genomes, stored = (
         np.concatenate(genomes),
         np.concatenate([fitness[order], best[raised]]),
@@ -55,23 +55,23 @@ def candidates(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
     return genomes[first], stored[first]
 
 
-def most_believed(experiment: Experiment) -> tuple[np.ndarray, float]:
+def most_believed(evolution: Evolution) -> tuple[np.ndarray, float]:
     """The genome `(genes,)` with the highest stored fitness of the run, and that.
 
     What a run without held-out starts would show as its best.
     """
-    best = [record.best for record in experiment.records]
+    best = [record.best for record in evolution.records]
     generation = int(np.argmax(best))
-    return experiment.best_genomes[generation], best[generation]
+    return evolution.best_genomes[generation], best[generation]
 
 
-def choose_champion(engine: Engine, experiment: Experiment) -> Champion:
+def choose_champion(engine: Engine, evolution: Evolution) -> Champion:
     """The candidate with the highest mean on the validation starts."""
-    genomes, stored = candidates(experiment)
-    starts = starts_for_validation(experiment.space)
-    network = experiment.config.network
+    genomes, stored = candidates(evolution)
+    starts = starts_for_validation(evolution.space)
+    network = evolution.config.network
     # as it was evolved: robots that are disturbed alike
-    config = experiment.config
+    config = evolution.config
     met = held_out_disturbances(
         config.conditions, Purpose.VALIDATION, len(starts), config.steps
     )

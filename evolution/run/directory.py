@@ -17,7 +17,7 @@ from evolution.settings.config import ExperimentConfig, differing_keys
 from evolution.settings.config_files import load_config
 
 if TYPE_CHECKING:
-    from evolution.run.generation_loop import Experiment
+    from evolution.run.generation_loop import Evolution
 
 LOCK = ".lock"
 """File that the process which works in a directory holds."""
@@ -131,8 +131,8 @@ class RunDirectory:
                 + ", ".join(differing)
             )
 
-    def restore(self, experiment: "Experiment", provenance: dict) -> list[str]:
-        """Put the experiment where the checkpoint is; at its start if there is none.
+    def restore(self, evolution: "Evolution", provenance: dict) -> list[str]:
+        """Put the evolution where the checkpoint is; at its start if there is none.
 
         Returns:
             What differs from where the run began and may change its last bits.
@@ -148,9 +148,9 @@ class RunDirectory:
             try:
                 config = str(state.pop("config", ""))
                 where = f"its config in '{self.checkpoint}'"
-                if ExperimentConfig.from_yaml(config, where) != experiment.config:
+                if ExperimentConfig.from_yaml(config, where) != evolution.config:
                     raise ValueError("it was made with another config")
-                experiment.restore(state)
+                evolution.restore(state)
             except ValueError as error:
                 raise UserError(
                     f"'{self.checkpoint}' is not a checkpoint of this run: {error}"
@@ -158,7 +158,7 @@ class RunDirectory:
         with files.writing():
             files.remove_leftovers(self.path)
             # the run may have been killed between its files
-            self._write_derived(experiment, ())
+            self._write_derived(evolution, ())
             resumed = [*first.get("resumed", ()), provenance]
             files.write_text(self.provenance, to_json({**first, "resumed": resumed}))
         keys = ("versions", "git", "processor")
@@ -172,42 +172,40 @@ class RunDirectory:
                 f"since (SHA-256 {before}, now {after})"
             )
 
-    def save(self, experiment: "Experiment", seconds: Sequence[float]) -> None:
+    def save(self, evolution: "Evolution", seconds: Sequence[float]) -> None:
         """Checkpoint, then what can be derived from it.
 
         Args:
-            experiment: to save.
+            evolution: to save.
             seconds: that each generation since the last save took.
 
         Raises:
             UserError: if the directory can no longer be written; what was there
                 before is intact.
         """
-        config = np.array(experiment.config.to_yaml())
+        config = np.array(evolution.config.to_yaml())
         try:
-            state = {"config": config, **experiment.state()}
+            state = {"config": config, **evolution.state()}
             files.write_arrays(self.checkpoint, state)
-            self._write_derived(experiment, seconds)
+            self._write_derived(evolution, seconds)
         except OSError as error:
             raise UserError(
                 f"cannot write '{self.path}': {error.strerror}; what was there before "
                 f"is intact: --resume {self.path}"
             ) from None
 
-    def _write_derived(
-        self, experiment: "Experiment", seconds: Sequence[float]
-    ) -> None:
+    def _write_derived(self, evolution: "Evolution", seconds: Sequence[float]) -> None:
         """What the checkpoint holds as well, for those who only read."""
-        files.write_text(self.history, experiment.history())
-        if experiment.records:
+        files.write_text(self.history, evolution.history())
+        if evolution.records:
             best = {
-                "genomes": np.array(experiment.best_genomes),
-                "fitness": np.array([record.best for record in experiment.records]),
+                "genomes": np.array(evolution.best_genomes),
+                "fitness": np.array([record.best for record in evolution.records]),
             }
             files.write_arrays(self.best_individuals, best)
-            files.write_text(self.timing, self._timing(experiment, seconds))
+            files.write_text(self.timing, self._timing(evolution, seconds))
 
-    def _timing(self, experiment: "Experiment", seconds: Sequence[float]) -> str:
+    def _timing(self, evolution: "Evolution", seconds: Sequence[float]) -> str:
         """Text of timing.csv; no seconds where a kill took them."""
         taken: dict[int, str] = {}
         if files.is_file(self.timing):
@@ -216,12 +214,12 @@ class RunDirectory:
                 # a row that was cut off says nothing
                 with suppress(KeyError, TypeError, ValueError):
                     taken[int(row["generation"])] = f"{float(row['seconds']):.3f}"
-        first = len(experiment.records) - len(seconds)
+        first = len(evolution.records) - len(seconds)
         taken |= {first + i: f"{each:.3f}" for i, each in enumerate(seconds)}
         lines = [
             f"{record.generation},{taken.get(record.generation, '')},"
             f"{record.control_steps},{record.crash_rate:.4f}\n"
-            for record in experiment.records
+            for record in evolution.records
         ]
         return "".join(["generation,seconds,control_steps,crash_rate\n", *lines])
 

@@ -11,7 +11,7 @@ from epuck_mj.host.files import writing
 from evolution.judging.held_out import Judges
 from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
-from evolution.run.generation_loop import Experiment, Record
+from evolution.run.generation_loop import Evolution, Record
 from evolution.run.means import Means
 from evolution.run.provenance import provenance
 from evolution.run.results import write_results
@@ -42,15 +42,15 @@ class Run:
         Raises:
             UserError: if robot or arena cannot be used, or the budget is too small.
         """
-        self.experiment = Experiment(config, means.engine, means.threads, means.racing)
+        self.evolution = Evolution(config, means.engine, means.threads, means.racing)
         self.directory = directory
         # found out now, not after the evolution
         judges = Judges(means.threads)
-        scene, space = self.experiment.scene, self.experiment.space
+        scene, space = self.evolution.scene, self.evolution.space
         judges.add(config.robot, config.setting, scene, space)
         self._judges = judges.tested_on(config.robot, config.setting)
         self._provenance = provenance(
-            self.experiment.scene, argv, str(means.engine), means.threads
+            self.evolution.scene, argv, str(means.engine), means.threads
         )
         self._threads = means.threads
 
@@ -60,7 +60,7 @@ class Run:
         Raises:
             UserError: if it holds anything, or cannot be written.
         """
-        self.directory.create(self.experiment.config, self._provenance)
+        self.directory.create(self.evolution.config, self._provenance)
 
     def resume(self) -> list[str]:
         """Go on with what the directory holds.
@@ -71,18 +71,18 @@ class Run:
         Raises:
             UserError: as `RunDirectory.restore`.
         """
-        return self.directory.restore(self.experiment, self._provenance)
+        return self.directory.restore(self.evolution, self._provenance)
 
     def evolve(self) -> Iterator[Record]:
         """Go through the generations that are left, saving on the way."""
         before, cost = time.monotonic(), 0.0
         seconds: list[float] = []
-        for record in self.experiment.run():
+        for record in self.evolution.run():
             after = time.monotonic()
             seconds.append(after - before)
             before = after
-            if sum(seconds) * SAVING_SHARE > cost or self.experiment.finished:
-                self.directory.save(self.experiment, seconds)
+            if sum(seconds) * SAVING_SHARE > cost or self.evolution.finished:
+                self.directory.save(self.evolution, seconds)
                 before = time.monotonic()
                 cost, seconds = before - after, []
             yield record
@@ -95,7 +95,7 @@ class Run:
         """
         with writing():
             scores = write_results(
-                self.experiment, self._judges, self.directory, self._threads
+                self.evolution, self._judges, self.directory, self._threads
             )
         self.directory.mark_finished()
         return scores

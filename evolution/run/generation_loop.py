@@ -52,7 +52,7 @@ HISTORY: tuple[str, ...] = ("generation", "evaluations", "best", "mean", "std")
 """Columns of history.csv: racing changes none of them."""
 
 
-class Experiment:
+class Evolution:
     """A run of evolution that can be stopped and resumed between generations."""
 
     def __init__(
@@ -159,7 +159,7 @@ class Experiment:
         """Go on from a `state`.
 
         Raises:
-            ValueError: if it does not belong to this experiment.
+            ValueError: if it does not belong to this run.
         """
         prefix = "optimizer."
         rows, genomes = (self._array(state, name) for name in ARRAYS)

@@ -18,7 +18,7 @@ from typing import Any, Self
 import numpy as np
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import command
+from epuck_mj.host.command_line import shell_command
 from epuck_mj.host.interruption import deaf_to_interrupts
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace
@@ -28,7 +28,7 @@ from evolution.judging.starts import (
     held_out_disturbances,
     starts_for_test,
 )
-from evolution.run.generation_loop import Experiment, Record
+from evolution.run.generation_loop import Evolution, Record
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.randomness import Purpose
 
@@ -49,24 +49,24 @@ Generation = tuple[Record, np.ndarray]
 
 
 class Live:
-    """Shows an experiment while the context lasts."""
+    """Shows an evolution while the context lasts."""
 
-    def __init__(self, experiment: Experiment):
-        """Name the experiment; nothing is shown yet."""
-        self._experiment = experiment
+    def __init__(self, evolution: Evolution):
+        """Name the evolution; nothing is shown yet."""
+        self._evolution = evolution
         self._shown = 0
         context = multiprocessing.get_context("spawn")
         self._queue: Any = context.Queue(BACKLOG)
         self._process = context.Process(
-            target=_show, args=(experiment.config, PORT, self._queue), daemon=True
+            target=_show, args=(evolution.config, PORT, self._queue), daemon=True
         )
 
     def update(self) -> None:
         """Hand over the generations since the last call."""
-        experiment = self._experiment
-        records = experiment.records[self._shown :]
-        genomes = experiment.best_genomes[self._shown :]
-        self._shown = len(experiment.records)
+        evolution = self._evolution
+        records = evolution.records[self._shown :]
+        genomes = evolution.best_genomes[self._shown :]
+        self._shown = len(evolution.records)
         if self._process.is_alive():
             for generation in zip(records, genomes, strict=True):
                 self._hand_over(generation)
@@ -104,7 +104,7 @@ def require_viewer() -> None:
     if not viewer_there(PORT):
         raise UserError(
             f"no rerun viewer at {HOST}:{PORT} for --live; start one first: "
-            + command("rerun")
+            + shell_command("rerun")
         )
 
 

@@ -17,7 +17,7 @@ from evolution.judging.scores import Believed, Scores
 from evolution.judging.starts import N_TEST, held_out_disturbances
 from evolution.run.champion import Champion, choose_champion, most_believed
 from evolution.run.directory import RunDirectory
-from evolution.run.generation_loop import Experiment
+from evolution.run.generation_loop import Evolution
 from evolution.settings.randomness import Purpose
 
 N_SHOWN = 4
@@ -25,7 +25,7 @@ N_SHOWN = 4
 
 
 def write_results(
-    experiment: Experiment,
+    evolution: Evolution,
     judges: Mapping[str, Judge],
     directory: RunDirectory,
     threads: int = 0,
@@ -33,7 +33,7 @@ def write_results(
     """Choose the champion, test it, and write everything that shows it.
 
     Args:
-        experiment: a finished run.
+        evolution: a finished run.
         judges: by robot, as of `Judges.tested_on`.
         directory: where to write.
         threads: that step the robots; 0 is one per core.
@@ -41,9 +41,9 @@ def write_results(
     Returns:
         The champion's scores, as written.
     """
-    config = experiment.config
+    config = evolution.config
     champion = choose_champion(
-        BatchEngine(experiment.scene, config.task, threads), experiment
+        BatchEngine(evolution.scene, config.task, threads), evolution
     )
     policy = config.network.decode(champion.genome)
     met = held_out_disturbances(config.conditions, Purpose.TEST, N_TEST, config.steps)
@@ -53,7 +53,7 @@ def write_results(
         if met is not None
     }
     # what the run believed its best to be, and what that is worth on an ideal robot
-    genome, stored = most_believed(experiment)
+    genome, stored = most_believed(evolution)
     believed = next(iter(judges.values())).test(config.network.decode(genome))
     scores = Scores(
         stored=champion.stored_fitness,
@@ -63,21 +63,21 @@ def write_results(
     )
     if as_evolved:
         scores = scores.model_copy(update={"held_out_as_evolved": as_evolved})
-    controller = _controller_file(experiment, champion, scores)
+    controller = _controller_file(evolution, champion, scores)
     files.write_text(directory.champion, controller.to_json())
-    _draw_fitness(experiment, directory)
+    _draw_fitness(evolution, directory)
     wheeled = judges[WHEELED_ROBOT]
     starts = wheeled.starts(N_SHOWN)
     shown = None if met is None else met[:N_SHOWN]
     text = scores.in_lines(config.steps)
-    _show(experiment, directory, policy, wheeled.scene, starts, shown, text)
+    _show(evolution, directory, policy, wheeled.scene, starts, shown, text)
     return scores
 
 
 def _controller_file(
-    experiment: Experiment, champion: Champion, scores: Scores
+    evolution: Evolution, champion: Champion, scores: Scores
 ) -> ControllerFile:
-    config = experiment.config
+    config = evolution.config
     return ControllerFile(
         network=config.network,
         genome=champion.genome,
@@ -86,29 +86,29 @@ def _controller_file(
             config.robot,
             config.arena,
             config.start_clearance,
-            dict(experiment.scene.sha256),
+            dict(evolution.scene.sha256),
         ),
         scores=scores.to_dict(),
     )
 
 
-def _draw_fitness(experiment: Experiment, directory: RunDirectory) -> None:
+def _draw_fitness(evolution: Evolution, directory: RunDirectory) -> None:
     from epuck_mj.show.figures import fitness_figure
     from epuck_mj.show.pictures import save_figure
 
-    records = experiment.records
+    records = evolution.records
     figure = fitness_figure(
         [record.evaluations for record in records],
         [record.best for record in records],
         [record.mean for record in records],
-        title=f"{experiment.optimizer.name}, seed {experiment.config.seed}",
-        steps=experiment.config.steps,
+        title=f"{evolution.optimizer.name}, seed {evolution.config.seed}",
+        steps=evolution.config.steps,
     )
     save_figure(figure, directory.fitness_figure)
 
 
 def _show(
-    experiment: Experiment,
+    evolution: Evolution,
     directory: RunDirectory,
     policy: Controller,
     scene: Scene,
@@ -121,7 +121,7 @@ def _show(
     from epuck_mj.show.pictures import save_figure
     from epuck_mj.show.recording import Trial, save_recording
 
-    task = experiment.config.task
+    task = evolution.config.task
     trials = record_trajectories(scene, policy, starts, task, met)
     titles = [
         f"start {i}: fitness {trial.trial_fitness:.0f}"
@@ -132,6 +132,6 @@ def _show(
     )
     trials[0].save(directory.trajectory)
     trial = Trial("start 0", trials[0], task)
-    title = f"{experiment.optimizer.name}, seed {experiment.config.seed}"
-    text = f"# {title}\n\n{scores}\n\n```\n{experiment.config.to_yaml()}```\n"
+    title = f"{evolution.optimizer.name}, seed {evolution.config.seed}"
+    text = f"# {title}\n\n{scores}\n\n```\n{evolution.config.to_yaml()}```\n"
     save_recording(directory.recording, scene, [trial], title, text)

@@ -14,9 +14,9 @@ from tqdm import tqdm
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.host.command_line import command, main, parse
+from epuck_mj.host.command_line import main, parse, shell_command
 from epuck_mj.host.interruption import Interrupted, Interruption
-from epuck_mj.policies import file as controller_file
+from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
 from evolution.judging.scores import KnownScores, Scores
 from evolution.run.directory import RunDirectory, locked
@@ -107,7 +107,7 @@ def study(argv: Sequence[str]) -> int:
                     event.job for event in events if event.failure is not None
                 )
         except Interrupted:
-            again = command(MODULE, *argv)
+            again = shell_command(MODULE, *argv)
             print(f"Interrupted; go on with: {again}", file=sys.stderr)
             return interruption.status
     done = len(everything) - len(failed)
@@ -116,7 +116,7 @@ def study(argv: Sequence[str]) -> int:
     if failed:
         print(f"failed: {', '.join(map(str, failed))}", file=sys.stderr)
     if done:
-        print(f"Report: {command('evolution.report', directory.path)}")
+        print(f"Report: {shell_command('evolution.report', directory.path)}")
     return 1 if failed else 0
 
 
@@ -201,7 +201,7 @@ def _shown(
 def _line(job: Job) -> str:
     """What a finished run has found."""
     path = RunDirectory(job.directory).champion
-    scores = Scores.read(controller_file.load(path).scores, path)
+    scores = Scores.read(load_controller(path).scores, path)
     return f"{job}: {scores.in_short}"
 
 

@@ -10,8 +10,7 @@ import numpy as np
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.yaml_and_json import read_json
-from epuck_mj.policies import file as controller_file
-from epuck_mj.policies.file import ControllerFile
+from epuck_mj.policies.file import ControllerFile, load_controller
 from epuck_mj.policies.wall_follower import YARDSTICK
 from evolution.judging.scores import HeldOut, KnownScores, Scores
 from evolution.run.directory import RunDirectory
@@ -182,7 +181,7 @@ def _run(directory: RunDirectory, config: ExperimentConfig, seed: int) -> RunDat
     differing = differing_keys(stored, config.model_copy(update={"seed": seed}))
     if differing:
         raise UserError(f"of another config: {', '.join(differing)}")
-    champion = controller_file.load(directory.champion)
+    champion = load_controller(directory.champion)
     scores = Scores.read(champion.scores, directory.champion)
     history = read_history(directory.history)
     return RunData(seed, history, champion, scores, directory.path)
