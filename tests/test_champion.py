@@ -197,7 +197,7 @@ def test_stored_fitness_does_not_choose_the_champion():
 def test_held_out_against_a_slow_loop(finished):
     experiment, _ = finished
     config = experiment.config
-    judge = Judge(experiment.scene, config.task, config.start_clearance, threads=1)
+    judge = Judge(experiment.scene, experiment.space, config.task, threads=1)
     # the first of all test starts
     starts = starts_for_test(experiment.space)[:25]
     np.testing.assert_array_equal(judge.starts(25), starts)

@@ -85,7 +85,7 @@ class RunDirectory(run_directory.RunDirectory):
 
 run.RunDirectory = RunDirectory
 execution.SAVING_SHARE = math.inf
-main(run.run)
+main(run.evolve)
 """
 """`evolution.run` that saves every generation and leaves time to look at it."""
 
@@ -830,11 +830,11 @@ def test_resume_from_another_directory(unfinished, finished, quick, monkeypatch)
 TWICE = """
 import signal, sys
 from epuck_mj.host.command_line import main
-from evolution.run import __main__ as run
+from evolution.run import __main__ as run, progress
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-class Progress(run.Progress):
+class Progress(progress.Progress):
     def update(self, record):
         signal.raise_signal(signal.SIGINT)
 
@@ -844,12 +844,12 @@ class Progress(run.Progress):
             signal.raise_signal(signal.SIGINT)
 
 def late(argv):
-    status = run.run(argv)
+    status = run.evolve(argv)
     if MOMENT == "leaving":
         signal.raise_signal(signal.SIGINT)
     return status
 
-run.Progress = Progress
+progress.Progress = Progress
 main(late)
 """
 
