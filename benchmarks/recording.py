@@ -21,7 +21,7 @@ from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.show.recording import Trial, save_recording
 from epuck_mj.trials.recorder import record
-from evolution.judging.starts import starts_for_test
+from evolution.judging.held_out_starts import starts_for_test
 from evolution.named_policies import named_policies
 
 RUN = "results/paper/de-best/seed-1"

@@ -14,8 +14,8 @@ from epuck_mj.host.command_line import check_threads, main, parse
 from epuck_mj.policies.wall_follower import YARDSTICK
 from epuck_mj.step.conditions import Conditions, NoiseLevel
 from epuck_mj.step.disturbances import Disturbances
+from evolution.judging.held_out_starts import N_TEST, held_out_disturbances
 from evolution.judging.scores import HeldOut
-from evolution.judging.starts import N_TEST, held_out_disturbances
 from evolution.named_policies import named_policies
 from evolution.settings.randomness import Purpose
 from evolution.settings.setting import Setting

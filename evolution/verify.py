@@ -17,8 +17,8 @@ from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import check_threads, main, parse
 from epuck_mj.policies.file import ControllerFile, load_controller
+from evolution.judging.held_out_starts import held_out_disturbances
 from evolution.judging.scores import Scores
-from evolution.judging.starts import held_out_disturbances
 from evolution.run.directory import RunDirectory
 from evolution.run.provenance import processor
 from evolution.settings.config import ExperimentConfig
@@ -94,7 +94,7 @@ def _verified(run: RunDirectory, judges: "Judges") -> bool:
         *_edited(champion, config, judges),
     ]
     if differing:
-        causes = _changes(run.provenance_fields())
+        causes = changes(run.provenance_fields())
         print(f"{run.path}: {'; '.join(differing)}")
         print(
             f"  since then: {'; '.join(causes) or 'nothing that is recorded changed'}"
@@ -166,7 +166,7 @@ def _edited(
         yield "its robot or arena has been edited since"
 
 
-def _changes(provenance: dict) -> list[str]:
+def changes(provenance: dict) -> list[str]:
     """Versions and processor that are not those of the run, a text each."""
     changes = []
     for package, before in provenance.get("versions", {}).items():

@@ -12,15 +12,15 @@ from epuck_mj.policies.file import Origin, load_controller
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.step.control import control_step
 from epuck_mj.step.sensors import observe
-from evolution.judging import starts as starts_module
+from evolution.judging import held_out_starts as starts_module
 from evolution.judging.held_out import Judge, Judges
-from evolution.judging.scores import Believed, Scores
-from evolution.judging.starts import (
+from evolution.judging.held_out_starts import (
     N_TEST,
     held_out_disturbances,
     starts_for_test,
     starts_for_validation,
 )
+from evolution.judging.scores import Believed, Scores
 from evolution.run import results
 from evolution.run.champion import (
     LATEST_BEST,

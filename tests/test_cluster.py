@@ -39,7 +39,7 @@ REPRODUCED = ("history.csv", "champion.json")
 
 # pictures are not drawn and few starts held out, here and by every worker
 QUICKER = """
-from evolution.judging import held_out, starts
+from evolution.judging import held_out, held_out_starts as starts
 from evolution.run import results
 
 

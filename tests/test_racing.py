@@ -17,7 +17,7 @@ from epuck_mj.step.control import TaskParameters, Trials, run_trials
 from epuck_mj.step.fitness import STEP_FITNESS, STEP_FITNESS_MAX
 from epuck_mj.trials.recorder import record
 from evolution.judging import evaluation
-from evolution.judging import starts as starts_module
+from evolution.judging import held_out_starts as starts_module
 from evolution.judging.evaluation import ROUNDING, BatchEngine, Race, evaluate
 from evolution.run.champion import choose_champion
 from evolution.run.generation_loop import Evolution

@@ -17,7 +17,7 @@ from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.trials.recorder import record
 from epuck_mj.trials.trajectory import Trajectory
-from evolution.judging.starts import (
+from evolution.judging.held_out_starts import (
     N_TEST,
     held_out_disturbances,
     starts_for_test,

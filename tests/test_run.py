@@ -28,7 +28,7 @@ from epuck_mj.policies.file import load_controller
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.trials.trajectory import Trajectory
-from evolution.judging import starts
+from evolution.judging import held_out_starts as starts
 from evolution.judging.held_out import Judge
 from evolution.run import execution, results
 from evolution.run.__main__ import evolve

@@ -19,7 +19,7 @@ import pytest
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from evolution.judging import starts
+from evolution.judging import held_out_starts as starts
 from evolution.judging.held_out import Judge
 from evolution.run import execution, results
 from evolution.run.__main__ import evolve
@@ -50,7 +50,7 @@ LONG = 300
 UNHURRIED = """
 import math, time
 from epuck_mj.host.command_line import main
-from evolution.judging import starts
+from evolution.judging import held_out_starts as starts
 from evolution.run import execution, results, directory as run_directory
 from evolution.study import __main__ as study
 from evolution.judging.held_out import Judge

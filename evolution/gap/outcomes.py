@@ -11,7 +11,7 @@ from epuck_mj.step.control import Everybody
 from epuck_mj.trials.recorder import record_tracks
 from epuck_mj.trials.tracks import Tracks
 from evolution.gap.worlds import World, met
-from evolution.judging.starts import starts_for_test
+from evolution.judging.held_out_starts import starts_for_test
 from evolution.named_policies import NamedPolicy
 
 

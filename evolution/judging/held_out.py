@@ -19,8 +19,8 @@ from epuck_mj.trials.behaviour_classes import class_shares
 from epuck_mj.trials.metrics import behaviour_of
 from epuck_mj.trials.recorder import record_tracks
 from evolution.judging.evaluation import CAPACITY
+from evolution.judging.held_out_starts import N_TEST, starts_for_test
 from evolution.judging.scores import HeldOut
-from evolution.judging.starts import N_TEST, starts_for_test
 from evolution.settings.setting import Setting
 from evolution.statistics.estimates import mean_interval, worst_share_mean
 

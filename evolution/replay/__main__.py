@@ -26,8 +26,8 @@ def replay(argv: Sequence[str]) -> int:
     conditions = Conditions.asked(options.noise, options.randomise, options.calibration)
     # physics and pictures only for a command that makes sense
     from evolution.named_policies import named_policies
+    from evolution.replay.choices import scene_for, starts_for
     from evolution.replay.output import Replay, outcome, show, text_panel
-    from evolution.replay.starts import scene_for, starts_for
     from evolution.replay.trials import from_file, labels, simulated
 
     recorded = [from_file(path) for path in paths if path.endswith(".npz")]

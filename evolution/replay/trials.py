@@ -13,7 +13,7 @@ from epuck_mj.step.control import TaskParameters
 from epuck_mj.trials.recorder import record_trajectories
 from epuck_mj.trials.trajectory import Trajectory
 from evolution.named_policies import NamedPolicy
-from evolution.replay.starts import Starts
+from evolution.replay.choices import Starts
 
 TRIALS_MAX = 50
 """Most trials of one recording: nobody could tell more apart."""

@@ -10,7 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from evolution.judging.evaluation import Engine, evaluate
-from evolution.judging.starts import held_out_disturbances, starts_for_validation
+from evolution.judging.held_out_starts import (
+    held_out_disturbances,
+    starts_for_validation,
+)
 from evolution.run.generation_loop import Evolution
 from evolution.settings.randomness import Purpose
 

@@ -23,7 +23,7 @@ from epuck_mj.host.interruption import deaf_to_interrupts
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.trials.recorder import record
-from evolution.judging.starts import (
+from evolution.judging.held_out_starts import (
     N_TEST,
     held_out_disturbances,
     starts_for_test,

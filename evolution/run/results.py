@@ -13,8 +13,8 @@ from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.trials.recorder import record_trajectories
 from evolution.judging.evaluation import BatchEngine
 from evolution.judging.held_out import Judge
+from evolution.judging.held_out_starts import N_TEST, held_out_disturbances
 from evolution.judging.scores import Believed, Scores
-from evolution.judging.starts import N_TEST, held_out_disturbances
 from evolution.run.champion import Champion, choose_champion, most_believed
 from evolution.run.directory import RunDirectory
 from evolution.run.generation_loop import Evolution

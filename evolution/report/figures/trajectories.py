@@ -10,7 +10,7 @@ from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.show.figures import trajectory_figure
 from epuck_mj.trials.recorder import record
-from evolution.judging.starts import starts_for_test
+from evolution.judging.held_out_starts import starts_for_test
 from evolution.pages.style import PAGE, PRINT, with_count
 from evolution.pages.words import PAPERS, label
 from evolution.settings.config import ExperimentConfig

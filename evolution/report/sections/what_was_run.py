@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from evolution.judging.starts import N_VALIDATION
+from evolution.judging.held_out_starts import N_VALIDATION
 from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
 from evolution.pages.words import NOTHING, evaluations, label, robot_name, spread
 from evolution.report.measures import shown_robots

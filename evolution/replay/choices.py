@@ -14,7 +14,7 @@ from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.disturbances import Disturbances
-from evolution.judging.starts import (
+from evolution.judging.held_out_starts import (
     N_TEST,
     N_VALIDATION,
     held_out_disturbances,
