@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import check_threads, main, parse
 from epuck_mj.policies.wall_follower import YARDSTICK
-from epuck_mj.step.conditions import Conditions, NoiseLevel
+from epuck_mj.step.conditions import ConditionFlags, Conditions
 from epuck_mj.step.disturbances import Disturbances
 from evolution.judging.held_out_starts import N_TEST, held_out_disturbances
 from evolution.judging.scores import HeldOut
@@ -37,10 +37,7 @@ class Options:
         robot: robot to test on; the one it evolved on, and of the two shipped ones the
             other, if not given.
         arena: arena to test in; the one it evolved in if not given.
-        noise: none for ideal sensors and motors; calibrated or strong for real ones.
-        randomise: another robot in each trial; needs noise.
-        calibration: file of python -m epuck_mj.calibrate: that robot in all trials;
-            needs noise.
+        robots: what the robots are like; ideal if not given.
         threads: threads that step the robots; 0 is one per core. Changes no result.
         json: also write everything to this file.
     """
@@ -50,9 +47,7 @@ class Options:
     starts: int = N_TEST
     robot: str | None = None
     arena: str | None = None
-    noise: NoiseLevel | None = None
-    randomise: bool = False
-    calibration: Path | None = None
+    robots: ConditionFlags = field(default_factory=ConditionFlags)
     threads: int = 0
     json: Path | None = None
 
@@ -76,8 +71,7 @@ def evaluate_policies(argv: Sequence[str]) -> int:
         for path in options.paths
         for found in named_policies(path, options.generations)
     ]
-    asked = (options.noise, options.randomise, options.calibration)
-    conditions = Conditions.asked(*asked) or Conditions()
+    conditions = options.robots.conditions or Conditions()
     if options.json is not None:
         files.check_writable(options.json)
     # simulators are for a command that makes sense

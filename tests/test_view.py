@@ -15,7 +15,7 @@ from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.disturbed import disturbed
-from epuck_mj.rungs.single import WatchedRobot
+from epuck_mj.rungs.watched_robot import WatchedRobot
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.scene.starts import FreeSpace

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from epuck_mj.check.at_rest import rest_findings
 from epuck_mj.check.findings import Finding, Place, Severity, Unusable, error
 from epuck_mj.check.parts import part_findings
-from epuck_mj.check.rest import rest_findings
 from epuck_mj.check.room import room_findings
 from epuck_mj.check.source import TOPIC, Source, compiled_source, read
 from epuck_mj.check.speed import speed_findings

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Self
+from typing import Literal
 
 import numpy as np
 
@@ -60,25 +60,42 @@ class Conditions:
             rng, n, steps, level, RANGES if self.randomise else BOOK
         )
 
-    @classmethod
-    def asked(
-        cls, noise: NoiseLevel | None, randomise: bool, calibration: Path | None
-    ) -> Self | None:
-        """What a person's flags say; None if none of them was given.
-
-        Raises:
-            UserError: if they exclude each other, or the file is no calibration.
-        """
-        if noise is None and not randomise and calibration is None:
-            return None
-        robot = None if calibration is None else Calibration.load(calibration)
-        try:
-            return cls(noise or "none", randomise, robot)
-        except ValueError as error:
-            raise UserError(str(error)) from None
-
     def __str__(self) -> str:
         """In words: `noise calibrated, other robots`."""
         robots = ", other robots" if self.randomise else ""
         robots += ", one calibrated robot" if self.calibration is not None else ""
         return f"noise {self.noise}{robots}"
+
+
+@dataclass(frozen=True)
+class ConditionFlags:
+    """Flags for what the robots are like.
+
+    Attributes:
+        noise: none for ideal sensors and motors; calibrated or strong for real ones;
+            default leaves the choice to the command.
+        randomise: another robot in each trial; needs noise.
+        calibration: file of python -m epuck_mj.calibrate: that robot in all trials;
+            needs noise.
+    """
+
+    noise: NoiseLevel | Literal["default"] = "default"
+    randomise: bool = False
+    calibration: Path | None = None
+
+    @property
+    def conditions(self) -> Conditions | None:
+        """What was asked for; None if none of the flags was given.
+
+        Raises:
+            UserError: if they exclude each other, or the file is no calibration.
+        """
+        if self == ConditionFlags():
+            return None
+        path = self.calibration
+        robot = None if path is None else Calibration.load(path)
+        noise = "none" if self.noise == "default" else self.noise
+        try:
+            return Conditions(noise, self.randomise, robot)
+        except ValueError as error:
+            raise UserError(str(error)) from None

@@ -7,7 +7,7 @@ start gives the trajectory of `epuck_mj.trials.recorder.record`, to the last bit
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ from epuck_mj.host.yaml_and_json import read_yaml
 from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.step.calibration import Calibration
-from epuck_mj.step.conditions import Conditions, NoiseLevel
+from epuck_mj.step.conditions import ConditionFlags, Conditions
 from epuck_mj.step.control import START_CLEARANCE, Policy, TaskParameters
 from epuck_mj.step.disturbances import Disturbances
 
@@ -45,13 +45,8 @@ class Options:
     """duration of a trial [s]; the controller's own by default"""
     seed: int = 0
     """seed of the random starts and of noise"""
-    noise: NoiseLevel | None = None
-    """none for ideal sensors and motors, calibrated or strong for real ones; as the
-    champion evolved, if its config.yaml is beside it, by default"""
-    randomise: bool = False
-    """another robot in each trial; needs noise"""
-    calibration: Path | None = None
-    """file of python -m epuck_mj.calibrate: that robot in all trials; needs noise"""
+    robots: ConditionFlags = field(default_factory=ConditionFlags)
+    """what the robot is like; as the champion's was, if its config.yaml is beside it"""
 
 
 def view(argv: Sequence[str]) -> int:
@@ -63,7 +58,7 @@ def view(argv: Sequence[str]) -> int:
     options = parse(Options, "python -m epuck_mj.view", argv)
     policy: Policy = WallFollower()
     task = TaskParameters()
-    conditions = Conditions.asked(options.noise, options.randomise, options.calibration)
+    conditions = options.robots.conditions
     if options.champion is not None:
         file = load_controller(options.champion)
         policy, task = file.controller, file.task
@@ -77,7 +72,7 @@ def view(argv: Sequence[str]) -> int:
             )
         task = replace(task, steps=round(ratio))
     # physics is for a command that makes sense
-    from epuck_mj.rungs.single import WatchedRobot
+    from epuck_mj.rungs.watched_robot import WatchedRobot
     from epuck_mj.scene.model import load_scene
     from epuck_mj.view.window import open_window, watch
 

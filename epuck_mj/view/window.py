@@ -14,7 +14,7 @@ import numpy as np
 
 from epuck_mj.errors import UserError
 from epuck_mj.rungs.disturbed import disturbed
-from epuck_mj.rungs.single import WatchedRobot
+from epuck_mj.rungs.watched_robot import WatchedRobot
 from epuck_mj.step.control import Policy, TaskParameters, drive
 from epuck_mj.step.disturbances import Disturbances
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse
-from epuck_mj.step.conditions import Conditions
 from evolution.replay.options import Options
 
 MODULE = "evolution.replay"
@@ -23,7 +22,7 @@ def replay(argv: Sequence[str]) -> int:
             "expected what to replay: a run directory, a controller file, "
             "wall-follower or a trajectory (.npz)"
         )
-    conditions = Conditions.asked(options.noise, options.randomise, options.calibration)
+    conditions = options.robots.conditions
     # physics and pictures only for a command that makes sense
     from evolution.named_policies import named_policies
     from evolution.replay.choices import scene_for, starts_for

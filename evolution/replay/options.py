@@ -1,12 +1,12 @@
 """What a person may ask of `python -m evolution.replay`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import tyro
 
 from epuck_mj.scene.model_files import WHEELED_ROBOT
-from epuck_mj.step.conditions import NoiseLevel
+from epuck_mj.step.conditions import ConditionFlags
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,7 @@ class Options:
         pose: on which start instead: x [m], y [m] and heading [degrees].
         robot: robot that drives.
         arena: arena to drive in; the one it evolved in if not given.
-        noise: none for ideal sensors and motors, calibrated or strong for real ones; as
-            it evolved if neither this nor the next two are given.
-        randomise: another robot in each trial; needs noise.
-        calibration: file of python -m epuck_mj.calibrate: that robot in all trials;
-            needs noise.
+        robots: what the robots are like; as a champion's were if not given.
         save: write the recording here (.rrd).
         web: write it as a web page into this folder, and serve that on 127.0.0.1.
         video: write a video here (.mp4); needs EGL or OSMesa.
@@ -46,9 +42,7 @@ class Options:
     pose: tuple[float, ...] = ()
     robot: str = WHEELED_ROBOT
     arena: str | None = None
-    noise: NoiseLevel | None = None
-    randomise: bool = False
-    calibration: Path | None = None
+    robots: ConditionFlags = field(default_factory=ConditionFlags)
     save: Path | None = None
     web: Path | None = None
     video: Path | None = None
