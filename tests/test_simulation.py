@@ -122,12 +122,12 @@ def test_the_hand_written_wall_follower_follows_walls(scene):
 
 
 @pytest.mark.slow
-def test_memory_stays_flat_over_10000_trials(scene):
+def test_memory_stays_flat_over_5000_trials(scene):
     starts = FreeSpace(scene, 0.01).sample(np.random.default_rng(4), 500)
     genomes = np.random.default_rng(5).uniform(-5, 5, (500, 40))
     robots = MujocoRobots(scene, 500)
     task, peak = TaskParameters(steps=4), []
-    for _ in range(22):
+    for _ in range(12):
         run_trials(robots, Network().decode(genomes), starts, task)
         peak.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
     # after the first 1,000 trials have touched all memory, in KiB
