@@ -19,7 +19,7 @@ test: $(INSTALLED)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/pyright
-	$(BIN)/python -m pytest -q -n 4 --dist worksteal --durations=20
+	$(BIN)/python -m pytest -q -n 3 --dist worksteal --durations=20
 
 bench: $(INSTALLED)
 	$(BIN)/python -m benchmarks.throughput --json results/throughput.json

@@ -38,7 +38,7 @@ class Arena:
     def __init__(self, robot: str = "epuck_planar", arena: str = "arena"):
         self.scene = load_scene(robot, arena)
         self.probe = ClearanceProbe(self.scene)
-        self.loops: WallLoops = wall_loops(self.scene, self.probe)
+        self.loops: WallLoops = wall_loops(self.scene)
 
     def measure(self, tracks: Tracks, task: TaskParameters = TASK) -> Behaviour:
         return behaviour_of(tracks, self.probe.measure(tracks.pose), self.loops, task)
@@ -361,7 +361,7 @@ def test_the_wall_follower_by_hand_is_one(scene):
     starts = FreeSpace(scene, 0.01).sample(np.random.default_rng(0), 50)
     robots = MujocoRobots(scene, len(starts))
     tracks = record_tracks(robots, WallFollower(), starts, TASK)
-    loops = wall_loops(scene, probe)
+    loops = wall_loops(scene)
     found = behaviour_of(tracks, probe.measure(tracks.pose), loops, TASK)
     assert class_shares(found)["wall follower"] > 0.9
     # its target is about 7 mm; corners take it farther off

@@ -8,7 +8,7 @@ import scipy.stats
 from epuck_mj.constants import BODY_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.scene.model import load_scene
-from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.scene.starts import FreeSpace, survey
 
 CLEARANCE = 0.01
 
@@ -126,3 +126,17 @@ def test_arenas_without_a_place_are_refused(tmp_path, geoms, expected):
     scene = load_scene("epuck_planar", arena(tmp_path, *geoms))
     with pytest.raises(UserError, match=expected):
         FreeSpace(scene, CLEARANCE)
+
+
+def test_scenes_that_are_compiled_alike_are_surveyed_once(tmp_path):
+    path = arena(tmp_path, *room())
+    first = survey(load_scene("epuck", path), CLEARANCE)
+    assert survey(load_scene("epuck", path), CLEARANCE) is first
+    assert survey(load_scene("epuck", path), 0.02) is not first
+    # a wall moves in the file, or in the model itself
+    arena(tmp_path, *room(0.4))
+    edited = load_scene("epuck", path)
+    smaller = survey(edited, CLEARANCE)
+    assert smaller.inside.sum() < 0.8 * first.inside.sum()
+    edited.model.geom_pos[edited.model.ngeom - 1, 0] += 0.1
+    assert survey(edited, CLEARANCE) is not smaller

@@ -59,7 +59,7 @@ def pillar(x: float, y: float, radius: float) -> str:
 def loops_of(path: str) -> tuple[WallLoops, ClearanceProbe]:
     scene = load_scene("epuck_planar", path)
     probe = ClearanceProbe(scene)
-    return wall_loops(scene, probe), probe
+    return wall_loops(scene), probe
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def test_in_the_square_there_is_one_along_the_walls(square):
 
 def test_both_robots_have_the_same_loops():
     wheeled = load_scene("epuck", "arena")
-    other = wall_loops(wheeled, ClearanceProbe(wheeled))
+    other = wall_loops(wheeled)
     np.testing.assert_allclose(other.points, loops_of("arena")[0].points, atol=1e-9)
 
 

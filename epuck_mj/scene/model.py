@@ -5,10 +5,12 @@ the whole scene; `load_scene` puts the robot asked for in that one's place. Robo
 differ in their base and nothing else: everybody else calls `Scene.qpos` and friends.
 """
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, wraps
 from pathlib import Path
+from typing import Any, TypeVar, cast
 
 import mujoco
 import numpy as np
@@ -27,6 +29,8 @@ from epuck_mj.scene.robot_parts import (
     sensor_address,
 )
 from epuck_mj.step.sensors import Reading
+
+Measure = TypeVar("Measure", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +92,34 @@ class Scene:
         return Reading(
             sensordata[..., self._distance], sensordata[..., self._contact] > 0
         )
+
+
+def once_per_model(measure: Measure) -> Measure:
+    """A function of a scene that is computed once for scenes that are compiled alike.
+
+    Its result depends on the model and on arguments behind the scene that can be
+    compared; whoever gets it must not change it.
+    """
+    known: dict[object, Any] = {}
+
+    @wraps(measure)
+    def remembered(scene: Scene, *others: Any) -> Any:
+        buffer = np.empty(mujoco.mj_sizeModel(scene.model), np.uint8)
+        mujoco.mj_saveModel(scene.model, None, buffer)
+        key = hashlib.sha256(buffer.tobytes()).digest(), *others
+        if key not in known:
+            found = measure(scene, *others)
+            # a study meets few arenas; a long session may meet many
+            if len(known) == REMEMBERED:
+                known.clear()
+            known[key] = found
+        return known[key]
+
+    return cast(Measure, remembered)
+
+
+REMEMBERED = 32
+"""Results of each function that are kept in memory."""
 
 
 def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:

@@ -14,7 +14,7 @@ from scipy import ndimage
 
 from epuck_mj.errors import UserError
 from epuck_mj.scene.geometry import box_around, walls
-from epuck_mj.scene.model import Scene
+from epuck_mj.scene.model import Scene, once_per_model
 from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL
 
 NODES_MAX = 400
@@ -67,6 +67,7 @@ class Grid:
         return near
 
 
+@once_per_model
 def survey(scene: Scene, clearance: float) -> Grid:
     """Where a robot fits, whether or not it may start there.
 

@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 
 from epuck_mj.constants import PROXIMITY_RANGE
 from epuck_mj.scene.clearance import ClearanceProbe
-from epuck_mj.scene.model import Scene
+from epuck_mj.scene.model import Scene, once_per_model
 from epuck_mj.scene.starts import FreeSpace
 
 LOOP_CLEARANCE = 0.02
@@ -117,20 +117,18 @@ def way_driven(poses: np.ndarray) -> np.ndarray:
     return np.cumsum(np.pad(steps, ((0, 0), (1, 0))), axis=1)
 
 
-def wall_loops(scene: Scene, probe: ClearanceProbe) -> WallLoops:
+@once_per_model
+def wall_loops(scene: Scene) -> WallLoops:
     """The loops of a scene, for robots inside its walls.
 
-    Args:
-        scene: robot and arena.
-        probe: of the same scene.
-
     Raises:
-        UserError: if no walls, no room or no inside is there.
+        UserError: if no walls, no room or no inside is there, or a wall of which no
+            clearance can be measured.
     """
     grid = FreeSpace(scene, LOOP_CLEARANCE).grid
     poses = np.zeros((*grid.inside.shape, 3))
     poses[..., :2] = grid.nodes
-    clearance = probe.measure(poses).distance
+    clearance = ClearanceProbe(scene, 1).measure(poses).distance
     # no loops around the arena, nor in rooms within walls
     clearance[~grid.inside] = np.minimum(clearance[~grid.inside], LOOP_CLEARANCE)
     x, y = poses[:, 0, 0], poses[0, :, 1]

@@ -98,7 +98,7 @@ class Judge:
         self._task = task
         self._threads = threads
         self._probe = ClearanceProbe(scene, threads)
-        self._loops = wall_loops(scene, self._probe)
+        self._loops = wall_loops(scene)
 
     def starts(self, n: int = N_TEST) -> np.ndarray:
         """The first of the test starts of this scene, `(n, 3)`."""
