@@ -12,6 +12,8 @@ from epuck_mj.policies.file import Origin, load_controller
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.step.control import control_step
 from epuck_mj.step.sensors import observe
+from epuck_mj.trials.recorder import record
+from epuck_mj.trials.trajectory import Trajectory
 from evolution.judging import held_out_starts as starts_module
 from evolution.judging.held_out import Judge, Judges
 from evolution.judging.held_out_starts import (
@@ -290,7 +292,6 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
     tmp_path, monkeypatch
 ):
     monkeypatch.setattr(results, "_draw_fitness", lambda *_: None)
-    monkeypatch.setattr(results, "_show", lambda *_: None)
     config = tiny("ga", steps=60, noise="strong", randomise=True)
     experiment = Evolution(config, threads=1)
     list(experiment.run())
@@ -308,6 +309,14 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
     assert test.mean != scores.held_out["epuck"].mean
     _, disturbed, _ = scores.in_lines(60).splitlines()
     assert disturbed.startswith("The same with the disturbances it evolved with: ")
+    # and shown so: the recorded trial is the first of that test
+    judge, shown = judges_of(config)["epuck"], Trajectory.load(directory.trajectory)
+    start, policy = judge.starts(1)[0], stored.controller
+    first = record(judge.scene, policy, start, config.task, met[:1])
+    ideal = record(judge.scene, policy, start, config.task)
+    np.testing.assert_array_equal(shown.pose, first.pose)
+    np.testing.assert_array_equal(shown.proximity, first.proximity)
+    assert shown.trial_fitness != ideal.trial_fitness
 
 
 def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
