@@ -12,10 +12,7 @@ from matplotlib.patches import Polygon
 from epuck_mj.errors import UserError
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.outline import _outline, shell_outline, wall_outlines
-from epuck_mj.show.figures import (
-    fitness_figure,
-    trajectory_figure,
-)
+from epuck_mj.show.figures import fitness_figure, trajectory_figure
 from epuck_mj.show.pictures import save_figure
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.trials.recorder import record

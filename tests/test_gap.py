@@ -19,12 +19,7 @@ from evolution.gap.__main__ import measure_gap
 from evolution.gap.gap_document import gap_document
 from evolution.gap.groups import experiments, peers
 from evolution.gap.outcomes import Outcome, abroad, ideal
-from evolution.gap.transfer import (
-    Transfer,
-    between_robots,
-    rank_correlations,
-    verdict,
-)
+from evolution.gap.transfer import Transfer, between_robots, rank_correlations, verdict
 from evolution.gap.worlds import ARENAS, LATENCY_MAX, WORLD_RANGES, World, met, worlds
 from evolution.named_policies import NamedPolicy, named_policies
 from evolution.pages.blocks import to_markdown

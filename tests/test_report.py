@@ -38,11 +38,7 @@ from evolution.report.measures import BEST_STORED
 from evolution.report.report_folder import tables
 from evolution.report.run_table import run_rows
 from evolution.report.samples import TARGET_SHARES
-from evolution.report.sections.comparisons import (
-    compared,
-    comparisons,
-    comparisons_of,
-)
+from evolution.report.sections.comparisons import compared, comparisons, comparisons_of
 from evolution.report.sections.cost_of_targets import target_costs
 from evolution.report.sections.held_out_fitness import held_out_fitness_section
 from evolution.report.sections.success import FOLLOWS, MATCHES, outcomes

@@ -36,10 +36,7 @@ from evolution.report.figures.curves import (
     on_grid,
     targets_figure,
 )
-from evolution.report.figures.trajectories import (
-    median_run,
-    trajectories_figure,
-)
+from evolution.report.figures.trajectories import median_run, trajectories_figure
 from evolution.report.samples import TARGET_SHARES
 from evolution.settings.config_files import find_config, load_config
 from evolution.study.data import RunData, StudyData

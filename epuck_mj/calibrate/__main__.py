@@ -7,13 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from epuck_mj.bridge.failures import (
-    DONE,
-    FAILED,
-    RUNAWAY,
-    BridgeError,
-    StillMoving,
-)
+from epuck_mj.bridge.failures import DONE, FAILED, RUNAWAY, BridgeError, StillMoving
 from epuck_mj.bridge.line.connect import connect
 from epuck_mj.bridge.line.interfaces import Connection
 from epuck_mj.calibrate.bench import Bench

@@ -10,11 +10,7 @@ from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.pages.words import PAPERS, label, median_and_quartiles
 from evolution.report.measures import held_out_measure, measures
 from evolution.report.samples import FOLLOWED, known
-from evolution.report.sections.comparisons import (
-    Comparison,
-    comparisons_of,
-    numbers,
-)
+from evolution.report.sections.comparisons import Comparison, comparisons_of, numbers
 from evolution.reproduce.verdicts import (
     HANGS_ON_READING,
     NOT_MEASURED,

@@ -15,13 +15,7 @@ from evolution.pages.blocks import (
 from evolution.pages.words import SPREAD, label, median_and_quartiles, spread
 from evolution.report.measures import shown_robots
 from evolution.report.samples import kept, most_believed_fitness
-from evolution.reproduce.claims import (
-    REPLICATES,
-    Claim,
-    claims,
-    held_out_order,
-    tally,
-)
+from evolution.reproduce.claims import REPLICATES, Claim, claims, held_out_order, tally
 from evolution.reproduce.differences_from_paper import differences_from_paper
 from evolution.reproduce.first_generation import FirstGeneration
 from evolution.reproduce.verdicts import fewest_to_contradict

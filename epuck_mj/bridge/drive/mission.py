@@ -11,13 +11,7 @@ from epuck_mj.bridge.drive.keyboard import Keyboard, keyboard
 from epuck_mj.bridge.drive.log import save_log
 from epuck_mj.bridge.drive.robot import RealRobot
 from epuck_mj.bridge.drive.session import Session
-from epuck_mj.bridge.failures import (
-    DONE,
-    FAILED,
-    RUNAWAY,
-    BridgeError,
-    StillMoving,
-)
+from epuck_mj.bridge.failures import DONE, FAILED, RUNAWAY, BridgeError, StillMoving
 from epuck_mj.bridge.line.interfaces import Connection
 from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import Interrupted, Interruption

@@ -10,12 +10,7 @@ import numpy as np
 
 from epuck_mj.bridge.drive.odometry import Odometry
 from epuck_mj.bridge.drive.schedule import Schedule
-from epuck_mj.bridge.failures import (
-    BridgeError,
-    LinkLost,
-    RobotRestarted,
-    StaleReading,
-)
+from epuck_mj.bridge.failures import BridgeError, LinkLost, RobotRestarted, StaleReading
 from epuck_mj.bridge.line.interfaces import Connection, Greeting
 from epuck_mj.constants import READING_AGE_MAX
 from epuck_mj.step.calibration import Calibration

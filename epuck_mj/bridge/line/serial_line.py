@@ -1,11 +1,6 @@
 """A robot on a serial line: an e-puck v1 over Bluetooth, an e-puck2 over either."""
 
-from epuck_mj.bridge.failures import (
-    BridgeError,
-    LinkLost,
-    RobotRestarted,
-    StillMoving,
-)
+from epuck_mj.bridge.failures import BridgeError, LinkLost, RobotRestarted, StillMoving
 from epuck_mj.bridge.language import ascii, binary
 from epuck_mj.bridge.language.replies import Cycle
 from epuck_mj.bridge.line.interfaces import Greeting

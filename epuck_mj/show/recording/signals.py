@@ -17,13 +17,7 @@ from epuck_mj.show.colors import (
     VERMILION,
     YELLOW,
 )
-from epuck_mj.show.recording.entities import (
-    DECIDED,
-    EARNED,
-    SENSED,
-    Entities,
-    columns,
-)
+from epuck_mj.show.recording.entities import DECIDED, EARNED, SENSED, Entities, columns
 from epuck_mj.trials.phases import CORNERING, CRASHED, FOLLOWING, SEARCHING, phases
 from epuck_mj.trials.trajectory import Trajectory
 

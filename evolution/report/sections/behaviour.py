@@ -15,11 +15,7 @@ from evolution.pages.words import (
     spread,
 )
 from evolution.report.measures import shown_robots
-from evolution.report.samples import (
-    class_means,
-    clearances,
-    whole_laps,
-)
+from evolution.report.samples import class_means, clearances, whole_laps
 from evolution.study.data import StudyData
 
 
