@@ -66,6 +66,9 @@ def test_a_trial_is_the_one_that_record_gives(robot, policy, noise):
         seen = np.concatenate([step.observation for step in steps])
         np.testing.assert_array_equal(seen, recorded.observation[1:])
         if own is None:
+            # an ideal robot has the scene's body and its limits
+            limits = watched.model.actuator_ctrlrange
+            np.testing.assert_array_equal(limits, scene.model.actuator_ctrlrange)
             distance = np.concatenate([step.reading.distance for step in steps])
             np.testing.assert_array_equal(distance, recorded.distance[1:])
         pose = scene.poses(watched.data.qpos)

@@ -29,6 +29,7 @@ class WatchedRobot:
         self.model = copy.copy(scene.model)
         self.data = mujoco.MjData(self.model)
         self.moved: Callable[[], None] = lambda: None
+        self._embodied = False
 
     def reset(self, starts: np.ndarray) -> Reading:
         """Put the robot at rest on a start `(1, 3)`: x, y [m], yaw [rad]."""
@@ -61,10 +62,13 @@ class WatchedRobot:
         for name, (where, values) in fields.items():
             getattr(self.model, name)[where] = values[0]
         mujoco.mj_setConst(self.model, self.data)
+        self._embodied = True
 
     def disembody(self) -> None:
         """See `Simulator.disembody`."""
-        self.embody(np.ones(1), np.ones(1))
+        if self._embodied:
+            self.embody(np.ones(1), np.ones(1))
+            self._embodied = False
 
     def _reading(self) -> Reading:
         return self.scene.reading(self.data.sensordata[None].copy())

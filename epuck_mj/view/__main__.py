@@ -87,7 +87,7 @@ def view(argv: Sequence[str]) -> int:
     def meet() -> Disturbances | None:
         return None if conditions is None else conditions.draw(noise, 1, task.steps)
 
-    if conditions is not None and meet() is not None:
+    if conditions is not None and conditions.noise != "none":
         print(f"driving with {conditions}", flush=True)
     with open_window(robot.model, robot.data) as window:
         for line in watch(window, robot, policy, starts, task, meet):
