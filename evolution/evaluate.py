@@ -14,14 +14,17 @@ from epuck_mj.host.command_line import check_threads, main, parse
 from epuck_mj.policies.wall_follower import YARDSTICK
 from epuck_mj.step.conditions import ConditionFlags, Conditions
 from epuck_mj.step.disturbances import Disturbances
-from evolution.judging.held_out_starts import N_TEST, held_out_disturbances
+from evolution.judging.held_out_starts import (
+    N_TEST,
+    STARTS_MAX,
+    held_out_disturbances,
+)
 from evolution.judging.scores import HeldOut
 from evolution.named_policies import named_policies
 from evolution.settings.randomness import Purpose
 from evolution.settings.setting import Setting
 
 MODULE = "evolution.evaluate"
-STARTS_MAX = 100_000
 
 
 @dataclass(frozen=True)

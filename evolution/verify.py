@@ -150,7 +150,7 @@ def _most_believed(
         policy = config.network.decode(genome)
     except (KeyError, ValueError, IndexError) as error:
         raise UserError(f"'{run.best_individuals}' is damaged: {error}") from None
-    mean = judges.of(config.robot, config.setting).test(policy).mean
+    mean = judges.of(config.robot, config.setting).test(policy, config.test_starts).mean
     if mean != written.held_out:
         yield f"the most believed {written.held_out!r} is now {mean!r}"
 

@@ -14,10 +14,8 @@ from epuck_mj.step.control import control_step
 from epuck_mj.step.sensors import observe
 from epuck_mj.trials.recorder import record
 from epuck_mj.trials.trajectory import Trajectory
-from evolution.judging import held_out_starts as starts_module
 from evolution.judging.held_out import Judge, Judges
 from evolution.judging.held_out_starts import (
-    N_TEST,
     held_out_disturbances,
     starts_for_test,
     starts_for_validation,
@@ -43,7 +41,8 @@ SHIPPED = ("de-best", "de-rand", "ga")
 def tiny(name: str, population: int = 20, **update) -> ExperimentConfig:
     config = load_config(find_config(name))
     optimizer = replace(config.optimizer, population=population)
-    update = {"evaluations": 6 * population, "steps": 25, "trials": 2} | update
+    sizes = {"evaluations": 6 * population, "steps": 25, "trials": 2}
+    update = sizes | {"validation_starts": 12, "test_starts": 30} | update
     return config.model_copy(update={"optimizer": optimizer} | update)
 
 
@@ -156,12 +155,9 @@ def test_the_tenth_is_rounded_and_at_least_one(population, n):
 # the choice
 
 
-def test_the_champion_is_best_on_the_validation_starts(finished, monkeypatch):
-    # the first starts are enough for a slow loop
-    monkeypatch.setattr(starts_module, "N_VALIDATION", 12)
+def test_the_champion_is_best_on_the_validation_starts(finished):
     experiment, _ = finished
-    starts = starts_for_validation(experiment.space)
-    assert starts.shape == (12, 3)
+    starts = starts_for_validation(experiment.space, 12)
     genomes, stored = candidates(experiment)
     means = [
         np.mean([slow_trial(experiment, genome, start)[0] for start in starts])
@@ -221,19 +217,6 @@ def test_held_out_against_a_slow_loop(finished):
     assert report.standard_deviation > 0
 
 
-@pytest.fixture(autouse=True, scope="module")
-def few_test_starts():
-    """What is said of 1,000 starts is true of fewer."""
-    test = Judge.test
-
-    def few(self, policy, n=30, met=None):
-        return test(self, policy, min(n, 30), None if met is None else met[:30])
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Judge, "test", few)
-        yield
-
-
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """Results of a run, without the pictures."""
@@ -267,14 +250,14 @@ def test_the_champion_file_holds_every_score(written):
     stored = load_controller(directory.champion)
     policy = experiment.config.network.decode(champion.genome)
     tests = {
-        robot: judge.test(policy)
+        robot: judge.test(policy, 30)
         for robot, judge in judges_of(experiment.config).items()
     }
     assert list(tests) == ["epuck_planar", "epuck"]
     # what evolution believed in most, on the robot that it was evolved on
     genome, believed = most_believed(experiment)
     judge = judges_of(experiment.config)["epuck_planar"]
-    worth = judge.test(experiment.config.network.decode(genome))
+    worth = judge.test(experiment.config.network.decode(genome), 30)
     assert Scores.read(stored.scores, directory.champion) == Scores(
         stored=champion.stored_fitness,
         validation=champion.validation_fitness,
@@ -302,7 +285,7 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
     found = scores.held_out_as_evolved
     assert list(found) == list(scores.held_out) == ["epuck_planar", "epuck"]
     # the first of those that anybody draws
-    met = held_out_disturbances(config.conditions, Purpose.TEST, N_TEST, config.steps)
+    met = held_out_disturbances(config.conditions, Purpose.TEST, 1000, config.steps)
     assert met is not None
     test = judges_of(config)["epuck"].test(stored.controller, 30, met)
     assert found["epuck"] == test
@@ -316,7 +299,7 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
     ideal = record(judge.scene, policy, start, config.task)
     np.testing.assert_array_equal(shown.pose, first.pose)
     np.testing.assert_array_equal(shown.proximity, first.proximity)
-    assert shown.trial_fitness != ideal.trial_fitness
+    assert shown.pose.tobytes() != ideal.pose.tobytes()
 
 
 def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
@@ -353,8 +336,7 @@ def test_a_run_on_the_wheeled_robot_is_tested_on_the_plane_as_well(
     assert len(scores.in_lines(10).splitlines()) == 2
 
 
-def test_a_champion_survives_the_checkpoint(finished, tmp_path, monkeypatch):
-    monkeypatch.setattr(starts_module, "N_VALIDATION", 12)
+def test_a_champion_survives_the_checkpoint(finished, tmp_path):
     experiment, _ = finished
     path = tmp_path / "checkpoint.npz"
     files.write_arrays(path, experiment.state())

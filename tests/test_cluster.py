@@ -31,24 +31,21 @@ from tests.processes import PATIENCE
 pytestmark = pytest.mark.slow
 
 
-SMALL = {"steps": 20, "trials": 2, "evaluations": 100}
-LONG = {"steps": 100, "trials": 2, "evaluations": 300}
-ENDLESS = {"steps": 100, "trials": 2, "evaluations": 1_000_000}
+FEW = {"validation_starts": 10, "test_starts": 10}
+SMALL = {"steps": 20, "trials": 2, "evaluations": 100} | FEW
+LONG = {"steps": 100, "trials": 2, "evaluations": 300} | FEW
+ENDLESS = {"steps": 100, "trials": 2, "evaluations": 1_000_000} | FEW
 
 REPRODUCED = ("history.csv", "champion.json")
 
-# pictures are not drawn and few starts held out, here and by every worker
+# pictures are not drawn, here and by every worker
 QUICKER = """
-from evolution.judging import held_out, held_out_starts as starts
 from evolution.run import results
 
 
 QUICKER = [
     (results, "_draw_fitness", lambda *_: None),
     (results, "_show", lambda *_: None),
-    (starts, "N_VALIDATION", 10),
-    (held_out.Judge.starts, "__defaults__", (10,)),
-    (held_out.Judge.test, "__defaults__", (10, None)),
 ]
 for place, name, value in QUICKER:
     assert hasattr(place, name)

@@ -78,7 +78,8 @@ def test_an_optimiser_of_ones_own_is_as_good_as_the_shipped_ones(extended):
 @pytest.mark.slow
 def test_an_optimiser_of_ones_own_in_a_study(extended):
     run = ["-m", "evolution.run", "particle-swarm", "--evaluations", "120"]
-    run += ["--steps", "10", "--trials", "2", "--output", "runs/one"]
+    run += ["--steps", "10", "--trials", "2", "--validation-starts", "5"]
+    run += ["--test-starts", "5", "--output", "runs/one"]
     done = python(*run, cwd=extended)
     assert done.returncode == 0, done.stderr
     assert "particle-swarm, seed 1: 120 evaluations in 3 generations" in done.stdout

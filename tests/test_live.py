@@ -12,14 +12,14 @@ import pytest
 from rerun.chunk import RrdReader
 
 from epuck_mj.errors import UserError
-from evolution.judging.held_out import Judge
 from evolution.replay.viewer import viewer_binary
 from evolution.replay.web import free_ports
 from evolution.run import live
 from evolution.run.__main__ import evolve
 from evolution.run.directory import RunDirectory
 
-ARGUMENTS = ("ga", "--evaluations", "500", "--steps", "15", "--threads", "1")
+FEW = ("--validation-starts", "5", "--test-starts", "5", "--threads", "1")
+ARGUMENTS = ("ga", "--evaluations", "500", "--steps", "15", *FEW)
 SAME = ("history.csv", "champion.json", "best_individuals.npz", "trajectory.npz")
 
 
@@ -31,9 +31,6 @@ def quiet(monkeypatch, tmp_path):
     for name, value in settings.items():
         monkeypatch.setenv(name, value)
     monkeypatch.delenv("RERUN", raising=False)
-    # what these runs' champions are worth is for others to test
-    test = Judge.test
-    monkeypatch.setattr(Judge, "test", lambda self, policy: test(self, policy, 5))
 
 
 @pytest.fixture
@@ -117,7 +114,7 @@ def test_a_viewer_that_goes_away_stops_nothing(viewer, tmp_path, capfd):
     thread.start()
     output = tmp_path / "live"
     # long enough for the viewer to go in the middle
-    arguments = ["ga", "--evaluations", "1000", "--steps", "60", "--threads", "1"]
+    arguments = ["ga", "--evaluations", "1000", "--steps", "60", *FEW]
     assert evolve([*arguments, "--output", str(output), "--live"]) == 0
     thread.join()
     assert RunDirectory(output).finished

@@ -30,6 +30,7 @@ def evolved(tmp_path_factory) -> Path:
     """A run that has evolved and not yet chosen its champion."""
     fields = load_config(find_config("ga")).model_dump()
     fields |= {"evaluations": 10 * GENERATIONS, "steps": 15, "trials": 2}
+    fields |= {"validation_starts": 10, "test_starts": 30}
     fields["start_clearance"] = 0.03
     fields["optimizer"]["population"] = 10
     path = tmp_path_factory.mktemp("study") / "ga" / "seed-1"

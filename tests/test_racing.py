@@ -17,7 +17,6 @@ from epuck_mj.step.control import TaskParameters, Trials, run_trials
 from epuck_mj.step.fitness import STEP_FITNESS, STEP_FITNESS_MAX
 from epuck_mj.trials.recorder import record
 from evolution.judging import evaluation
-from evolution.judging import held_out_starts as starts_module
 from evolution.judging.evaluation import ROUNDING, BatchEngine, Race, evaluate
 from evolution.run.champion import choose_champion
 from evolution.run.generation_loop import Evolution
@@ -301,9 +300,8 @@ def test_dm_control_gives_the_same_bytes_as_a_race(name):
 
 
 @pytest.mark.parametrize("name", RACES[:2])
-def test_the_same_champion_is_chosen(name, monkeypatch):
-    monkeypatch.setattr(starts_module, "N_VALIDATION", 20)
-    config = small(name)
+def test_the_same_champion_is_chosen(name):
+    config = small(name, validation_starts=20)
     chosen = []
     for racing in (True, False):
         experiment = evolved(config, racing=racing)

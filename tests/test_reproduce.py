@@ -11,7 +11,8 @@ from evolution.reproduce.verdicts import OTHER_STUDY
 
 TINY = """
 experiments: [ga.yaml, de-best.yaml]
-common: {evaluations: 20, steps: 20, trials: 2}
+common:
+  {evaluations: 20, steps: 20, trials: 2, validation_starts: 10, test_starts: 30}
 """
 EXPERIMENTS = {
     "ga": "optimizer: {algorithm: genetic_algorithm, population: 10}",

@@ -28,8 +28,6 @@ from epuck_mj.policies.file import load_controller
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.trials.trajectory import Trajectory
-from evolution.judging import held_out_starts as starts
-from evolution.judging.held_out import Judge
 from evolution.run import execution, results
 from evolution.run.__main__ import evolve
 from evolution.run.directory import LOCK
@@ -39,7 +37,8 @@ from evolution.settings.config_files import CONFIGS, find_config, load_config
 from tests.processes import PATIENCE, python_process
 from tests.shipped import OPTIMIZERS
 
-SMALL = ["--steps", "20", "--trials", "2", "--population", "10"]
+FEW = ["--validation-starts", "5", "--test-starts", "5"]
+SMALL = ["--steps", "20", "--trials", "2", "--population", "10", *FEW]
 SHORT = [*SMALL, "--evaluations", "20"]
 TINY = [*SMALL, "--evaluations", "60"]
 LONG = [*SMALL, "--evaluations", "400"]
@@ -142,14 +141,6 @@ def every_generation_saved(monkeypatch):
     monkeypatch.setattr(execution, "SAVING_SHARE", math.inf)
 
 
-@pytest.fixture
-def quick(no_pictures, monkeypatch):
-    """Few starts are held out too: for runs by the dozen."""
-    monkeypatch.setattr(starts, "N_VALIDATION", 5)
-    test = Judge.test
-    monkeypatch.setattr(Judge, "test", lambda self, policy: test(self, policy, 5))
-
-
 def tree(directory: Path) -> dict[str, str]:
     """Everything below a directory but locks, with a hash of the content of files."""
     return {
@@ -246,6 +237,7 @@ def test_the_stored_config_is_the_resolved_one(finished):
     directory, _ = finished
     shipped = load_config(find_config("ga")).model_dump()
     shipped |= {"seed": 7, "steps": 20, "evaluations": 60, "trials": 2}
+    shipped |= {"validation_starts": 5, "test_starts": 5}
     shipped["optimizer"]["population"] = 10
     assert load_config(directory / "config.yaml").model_dump() == shipped
 
@@ -299,7 +291,7 @@ def test_the_summary_is_in_plain_words(finished):
     assert re.fullmatch(
         r"ga, seed 7: 60 evaluations in 6 generations, \d+ min \d+ s", first
     )
-    assert fresh.startswith("Held-out fitness of 20, mean of 1000 fresh starts: ")
+    assert fresh.startswith("Held-out fitness of 20, mean of 5 fresh starts: ")
     for robot in ("epuck_planar", "epuck"):
         report = scores["held_out"][robot]
         mean, crashes = report["mean"], report["crash_rate"]
@@ -328,6 +320,7 @@ def test_own_yaml_default_output_and_the_same_seed_twice(finished, tmp_path):
     """`my.yaml --threads 1`: a file in place of the flags, another process."""
     config = load_config(find_config("ga")).model_dump()
     config |= {"seed": 7, "steps": 20, "evaluations": 60, "trials": 2}
+    config |= {"validation_starts": 5, "test_starts": 5}
     config["optimizer"]["population"] = 10
     (tmp_path / "my.yaml").write_text(yaml.safe_dump(config))
     process = evolution(tmp_path, "my.yaml", "--threads", "1")
@@ -341,7 +334,7 @@ def test_own_yaml_default_output_and_the_same_seed_twice(finished, tmp_path):
         assert (directory / name).read_bytes() == (finished[0] / name).read_bytes()
 
 
-def test_default_output_is_named_by_experiment_and_seed(here, quick):
+def test_default_output_is_named_by_experiment_and_seed(here, no_pictures):
     assert evolve(["de-rand", "--seed", "3", *SHORT]) == 0
     assert evolve(SHORT) == 0
     names = sorted(path.name for path in (here / "runs").iterdir())
@@ -419,7 +412,7 @@ def test_resume_of_a_finished_run_changes_nothing(finished, here, capsys):
     assert tree(finished[0]) == before
 
 
-def test_a_run_on_an_own_robot_of_another_name(here, quick, capsys):
+def test_a_run_on_an_own_robot_of_another_name(here, no_pictures, capsys):
     shutil.copy(MODELS / "epuck_planar.xml", here / "mine.xml")
     (here / "out").mkdir()
     # an empty directory is as good as none
@@ -436,7 +429,7 @@ def test_a_run_on_an_own_robot_of_another_name(here, quick, capsys):
     assert (here / "out" / "history.csv").read_bytes() == history
 
 
-def test_the_wheeled_robot_is_tested_on_the_plane_as_well(here, quick, capsys):
+def test_the_wheeled_robot_is_tested_on_the_plane_as_well(here, no_pictures, capsys):
     assert evolve(["ga", *SHORT, "--robot", "epuck", "--output", "out"]) == 0
     out = capsys.readouterr().out
     assert out.count("Held-out fitness") == 1
@@ -444,7 +437,7 @@ def test_the_wheeled_robot_is_tested_on_the_plane_as_well(here, quick, capsys):
     assert list(tests) == ["epuck", "epuck_planar"]
 
 
-def test_the_engine_changes_nothing(here, quick):
+def test_the_engine_changes_nothing(here, no_pictures):
     for engine in ("batch", "dm_control"):
         assert evolve(["ga", *SHORT, "--engine", engine, "--output", engine]) == 0
     assert_reproduced(here / "dm_control", here / "batch")
@@ -603,7 +596,7 @@ def test_resume_and_output_together_are_refused(refusal, unfinished):
     assert message == "expected --resume or --output, got both"
 
 
-def test_the_same_config_by_its_flags_can_be_resumed(unfinished, finished, quick):
+def test_the_same_config_by_its_flags_can_be_resumed(unfinished, finished, no_pictures):
     assert evolve(["ga", "--seed", "7", *TINY, "--resume", "run"]) == 0
     history = (unfinished / "history.csv").read_bytes()
     assert history == (finished[0] / "history.csv").read_bytes()
@@ -624,7 +617,7 @@ def test_a_checkpoint_that_is_none_is_refused(content, refusal, unfinished):
 
 
 def test_a_checkpoint_of_another_algorithm_or_size_is_refused(
-    refusal, unfinished, here, quick, capfd
+    refusal, unfinished, here, no_pictures, capfd
 ):
     path = unfinished / "checkpoint.npz"
     for argv in (["de-best", *SHORT], ["ga", *SHORT, "--population", "12"]):
@@ -754,7 +747,7 @@ def test_kill_9_at_any_moment_loses_at_most_one_generation(reference, tmp_path):
 
 
 @pytest.mark.slow
-def test_resume_from_between_any_two_writes(here, quick, monkeypatch):
+def test_resume_from_between_any_two_writes(here, no_pictures, monkeypatch):
     """What a kill would leave before and after each file, one after the other."""
     moments, write = [], files.write_bytes
 
@@ -780,7 +773,7 @@ def test_resume_from_between_any_two_writes(here, quick, monkeypatch):
 
 
 def test_a_full_disk_leaves_what_was_there(
-    here, quick, every_generation_saved, monkeypatch
+    here, no_pictures, every_generation_saved, monkeypatch
 ):
     argv = ["ga", *TINY, "--output"]
     assert evolve([*argv, "whole"]) == 0
@@ -805,7 +798,7 @@ def test_a_full_disk_leaves_what_was_there(
     assert_reproduced(here / "run", here / "whole")
 
 
-def test_a_run_that_has_only_its_config_can_be_resumed(here, quick):
+def test_a_run_that_has_only_its_config_can_be_resumed(here, no_pictures):
     argv = ["ga", *SHORT]
     assert evolve([*argv, "--output", "whole"]) == 0
     (here / "begun").mkdir()
@@ -816,7 +809,7 @@ def test_a_run_that_has_only_its_config_can_be_resumed(here, quick):
     assert provenance["finished"]
 
 
-def test_resume_from_another_directory(unfinished, finished, quick, monkeypatch):
+def test_resume_from_another_directory(unfinished, finished, no_pictures, monkeypatch):
     elsewhere = unfinished.parent / "else" / "where"
     elsewhere.mkdir(parents=True)
     monkeypatch.chdir(elsewhere)
@@ -885,14 +878,16 @@ def test_an_arena_that_the_wheeled_robot_cannot_use_is_refused_first(refusal, he
     refusal("ga", *TINY, "--arena", "mine.xml", "--output", "out")
 
 
-def test_a_checkpoint_of_another_seed_is_refused(refusal, unfinished, quick, capfd):
+def test_a_checkpoint_of_another_seed_is_refused(
+    refusal, unfinished, no_pictures, capfd
+):
     assert evolve(["ga", *TINY, "--seed", "8", "--output", "other"]) == 0
     capfd.readouterr()
     shutil.copy("other/checkpoint.npz", "run")
     refusal("--resume", "run")
 
 
-def test_a_robot_changed_since_is_refused_on_resume(refusal, here, quick, capfd):
+def test_a_robot_changed_since_is_refused_on_resume(refusal, here, no_pictures, capfd):
     (here / "mine.xml").write_text(FULL)
     argv = ["ga", *SHORT, "--robot", "mine.xml"]
     assert evolve([*argv, "--evaluations", "10", "--output", "run"]) == 0
@@ -905,7 +900,9 @@ def test_a_robot_changed_since_is_refused_on_resume(refusal, here, quick, capfd)
     refusal("--resume", "run")
 
 
-def test_a_run_on_an_own_robot_can_be_resumed_from_elsewhere(here, quick, monkeypatch):
+def test_a_run_on_an_own_robot_can_be_resumed_from_elsewhere(
+    here, no_pictures, monkeypatch
+):
     (here / "mine.xml").write_text(FULL)
     assert evolve(["ga", *SHORT, "--robot", "mine.xml", "--output", "run"]) == 0
     (here / "run" / "provenance.json").unlink()
@@ -914,13 +911,13 @@ def test_a_run_on_an_own_robot_can_be_resumed_from_elsewhere(here, quick, monkey
     assert evolve(["--resume", "../run"]) == 0
 
 
-def test_a_run_killed_while_it_wrote_its_config_can_be_started_again(here, quick):
+def test_a_run_killed_while_it_wrote_its_config_can_be_started_again(here, no_pictures):
     (here / "run").mkdir()
     (here / "run" / ".config.yaml-b2q7x_1c.tmp").write_text("seed: 7")
     assert evolve(["ga", *SHORT, "--output", "run"]) == 0
 
 
-def test_leftovers_of_a_kill_are_not_shown(unfinished, quick, capsys):
+def test_leftovers_of_a_kill_are_not_shown(unfinished, no_pictures, capsys):
     (unfinished / ".checkpoint.npz-b2q7x_1c.tmp").write_bytes(b"PK")
     assert evolve(["--resume", "run"]) == 0
     assert "b2q7x_1c.tmp" not in capsys.readouterr().out
@@ -933,7 +930,7 @@ def test_a_damaged_provenance_is_refused(content, refusal, unfinished):
 
 
 @pytest.mark.parametrize("name", ["history.csv", "champion.json"])
-def test_what_cannot_be_written_later_is_a_user_error(name, unfinished, quick):
+def test_what_cannot_be_written_later_is_a_user_error(name, unfinished, no_pictures):
     (unfinished / name).unlink(missing_ok=True)
     (unfinished / name).mkdir()
     with pytest.raises(UserError, match=name):

@@ -19,8 +19,6 @@ import pytest
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from evolution.judging import held_out_starts as starts
-from evolution.judging.held_out import Judge
 from evolution.run import execution, results
 from evolution.run.__main__ import evolve
 from evolution.run.directory import LOCK, RunDirectory
@@ -34,7 +32,12 @@ from tests.processes import PATIENCE, python_process
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
-SMALL = "steps: 20\ntrials: 2\nevaluations: 20\n"
+SMALL = """steps: 20
+trials: 2
+evaluations: 20
+validation_starts: 5
+test_starts: 5
+"""
 EXPERIMENTS = {
     "one": "{algorithm: differential_evolution, strategy: best, population: 10, "
     "scale: 0.8, crossover: 1.0}",
@@ -50,21 +53,17 @@ LONG = 300
 UNHURRIED = """
 import math, time
 from epuck_mj.host.command_line import main
-from evolution.judging import held_out_starts as starts
 from evolution.run import execution, results, directory as run_directory
 from evolution.study import __main__ as study
-from evolution.judging.held_out import Judge
 from tests.processes import python_process
 
 # in the processes of the runs as well, which import this file
-test, save = Judge.test, run_directory.RunDirectory.save
+save = run_directory.RunDirectory.save
 
 def saved(self, *arguments):
     save(self, *arguments)
     time.sleep(0.05)
 
-starts.N_VALIDATION = 5
-Judge.test = lambda self, policy: test(self, policy, 5)
 results._draw_fitness = results._show = lambda *_: None
 execution.SAVING_SHARE = math.inf
 run_directory.RunDirectory.save = saved
@@ -94,9 +93,6 @@ def write_study(folder: Path, evaluations: int = 20) -> None:
 
 def make_quick(patch: pytest.MonkeyPatch) -> None:
     """As in `UNHURRIED`, but without waiting."""
-    test = Judge.test
-    patch.setattr(Judge, "test", lambda self, policy: test(self, policy, 5))
-    patch.setattr(starts, "N_VALIDATION", 5)
     patch.setattr(results, "_draw_fitness", lambda *_: None)
     patch.setattr(results, "_show", lambda *_: None)
 

@@ -19,7 +19,7 @@ from epuck_mj.trials.behaviour_classes import class_shares
 from epuck_mj.trials.metrics import behaviour_of
 from epuck_mj.trials.recorder import record_tracks
 from evolution.judging.evaluation import CAPACITY
-from evolution.judging.held_out_starts import N_TEST, starts_for_test
+from evolution.judging.held_out_starts import starts_for_test
 from evolution.judging.scores import HeldOut
 from evolution.settings.setting import Setting
 from evolution.statistics.estimates import mean_interval, worst_share_mean
@@ -100,14 +100,14 @@ class Judge:
         self._probe = ClearanceProbe(scene, threads)
         self._loops = wall_loops(scene)
 
-    def starts(self, n: int = N_TEST) -> np.ndarray:
+    def starts(self, n: int) -> np.ndarray:
         """The first of the test starts of this scene, `(n, 3)`."""
         return starts_for_test(self._space, n)
 
     def test(
         self,
         policy: Policy,
-        n: int = N_TEST,
+        n: int,
         disturbances: Disturbances | None = None,
     ) -> HeldOut:
         """What the first `n` test starts say of a policy, one for all of them.

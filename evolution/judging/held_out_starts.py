@@ -18,14 +18,17 @@ HELD_OUT_SEED = 0
 """Seed of validation and test starts: no run's seed reaches their streams."""
 
 N_VALIDATION = 200
+"""Starts on which a champion is chosen, where a config says nothing else."""
 
 N_TEST = 1000
+"""Starts on which a champion is tested, where a config says nothing else."""
+
+STARTS_MAX = 100_000
 
 
-def starts_for_validation(space: "FreeSpace") -> np.ndarray:
-    """The starts on which champions are chosen, `(200, 3)`."""
-    rng = random_generator(HELD_OUT_SEED, Purpose.VALIDATION)
-    return space.sample(rng, N_VALIDATION)
+def starts_for_validation(space: "FreeSpace", n: int = N_VALIDATION) -> np.ndarray:
+    """The first `n` of the starts on which champions are chosen, `(n, 3)`."""
+    return space.sample(random_generator(HELD_OUT_SEED, Purpose.VALIDATION), n)
 
 
 def starts_for_test(space: "FreeSpace", n: int = N_TEST) -> np.ndarray:
@@ -36,5 +39,10 @@ def starts_for_test(space: "FreeSpace", n: int = N_TEST) -> np.ndarray:
 def held_out_disturbances(
     conditions: Conditions, purpose: Purpose, n: int, steps: int
 ) -> Disturbances | None:
-    """What champions meet in `n` trials of `steps`; in fewer, something else."""
-    return disturbances(conditions, n, steps, HELD_OUT_SEED, purpose)
+    """What champions meet in `n` trials of `steps`, from the first start on.
+
+    The first are the same for any `n` up to the default; for more, all are others.
+    """
+    least = N_VALIDATION if purpose == Purpose.VALIDATION else N_TEST
+    drawn = disturbances(conditions, max(n, least), steps, HELD_OUT_SEED, purpose)
+    return None if drawn is None else drawn[:n]

@@ -34,14 +34,12 @@ class Starts:
         names: of each, `n` of them.
         poses: `(n, 3)`: x, y [m], yaw [rad].
         purpose: of the held-out starts that they are among.
-        total: how many of these there are.
         first: number of the first among them.
     """
 
     names: tuple[str, ...]
     poses: np.ndarray
     purpose: Purpose = Purpose.TEST
-    total: int = N_TEST
     first: int = 0
 
     @classmethod
@@ -56,10 +54,9 @@ class Starts:
 
     def met(self, conditions: Conditions, steps: int) -> Disturbances | None:
         """What trials from here meet: as in the held-out test of all starts."""
-        everything = held_out_disturbances(conditions, self.purpose, self.total, steps)
-        if everything is None:
-            return None
-        return everything[self.first : self.first + len(self.names)]
+        end = self.first + len(self.names)
+        met = held_out_disturbances(conditions, self.purpose, end, steps)
+        return None if met is None else met[self.first :]
 
 
 def numbered_starts(spec: str, scene: Scene, clearance: float) -> Starts:
@@ -86,7 +83,7 @@ def numbered_starts(spec: str, scene: Scene, clearance: float) -> Starts:
     else:
         purpose, poses = Purpose.VALIDATION, starts_for_validation(space)
     names = tuple(f"{name} {i}" for i in range(first, last + 1))
-    return Starts(names, poses[first : last + 1], purpose, sizes[name], first)
+    return Starts(names, poses[first : last + 1], purpose, first)
 
 
 def scene_for(options: Options, policies: Sequence[NamedPolicy]) -> Scene:

@@ -70,14 +70,15 @@ def most_believed(evolution: Evolution) -> tuple[np.ndarray, float]:
 
 def choose_champion(engine: Engine, evolution: Evolution) -> Champion:
     """The candidate with the highest mean on the validation starts."""
-    genomes, stored = candidates(evolution)
-    starts = starts_for_validation(evolution.space)
-    network = evolution.config.network
-    # as it was evolved: robots that are disturbed alike
     config = evolution.config
+    genomes, stored = candidates(evolution)
+    starts = starts_for_validation(evolution.space, config.validation_starts)
+    # as it was evolved: robots that are disturbed alike
     met = held_out_disturbances(
         config.conditions, Purpose.VALIDATION, len(starts), config.steps
     )
-    fitness = evaluate(engine, network, genomes, starts, disturbances=met).fitness
+    fitness = evaluate(
+        engine, config.network, genomes, starts, disturbances=met
+    ).fitness
     best = int(fitness.argmax())
     return Champion(genomes[best], float(stored[best]), float(fitness[best]))

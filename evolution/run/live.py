@@ -24,7 +24,6 @@ from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.trials.recorder import record
 from evolution.judging.held_out_starts import (
-    N_TEST,
     held_out_disturbances,
     starts_for_test,
 )
@@ -141,9 +140,7 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
     scene = load_scene(config.robot, config.arena, config.control_step)
     start = starts_for_test(FreeSpace(scene, config.start_clearance), 1)[0]
     # as it evolves: what the first test start meets
-    met = held_out_disturbances(config.conditions, Purpose.TEST, N_TEST, config.steps)
-    if met is not None:
-        met = met[:1]
+    met = held_out_disturbances(config.conditions, Purpose.TEST, 1, config.steps)
     title = f"{config.optimizer.algorithm}, seed {config.seed}"
     address = f"rerun+http://{HOST}:{port}/proxy"
     view = LiveView(address, scene, title, config.steps)

@@ -13,7 +13,7 @@ from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.trials.recorder import record_trajectories
 from evolution.judging.evaluation import BatchEngine
 from evolution.judging.held_out import Judge
-from evolution.judging.held_out_starts import N_TEST, held_out_disturbances
+from evolution.judging.held_out_starts import held_out_disturbances
 from evolution.judging.scores import Believed, Scores
 from evolution.run.champion import Champion, choose_champion, most_believed
 from evolution.run.directory import RunDirectory
@@ -46,19 +46,20 @@ def write_results(
         BatchEngine(evolution.scene, config.task, threads), evolution
     )
     policy = config.network.decode(champion.genome)
-    met = held_out_disturbances(config.conditions, Purpose.TEST, N_TEST, config.steps)
+    n = config.test_starts
+    met = held_out_disturbances(config.conditions, Purpose.TEST, n, config.steps)
     as_evolved = {
-        robot: judge.test(policy, N_TEST, met)
+        robot: judge.test(policy, n, met)
         for robot, judge in judges.items()
         if met is not None
     }
     # what the run believed its best to be, and what that is worth on an ideal robot
     genome, stored = most_believed(evolution)
-    believed = next(iter(judges.values())).test(config.network.decode(genome))
+    believed = next(iter(judges.values())).test(config.network.decode(genome), n)
     scores = Scores(
         stored=champion.stored_fitness,
         validation=champion.validation_fitness,
-        held_out={robot: judge.test(policy) for robot, judge in judges.items()},
+        held_out={robot: judge.test(policy, n) for robot, judge in judges.items()},
         most_believed=Believed(stored=stored, held_out=believed.mean),
     )
     if as_evolved:

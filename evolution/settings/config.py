@@ -27,6 +27,7 @@ from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.conditions import Conditions, NoiseLevel
 from epuck_mj.step.control import START_CLEARANCE, STEPS_MAX, TaskParameters
 from epuck_mj.step.motors import Speeds
+from evolution.judging.held_out_starts import N_TEST, N_VALIDATION, STARTS_MAX
 from evolution.search.table import ALGORITHMS, OptimizerParameters, SearchSpace
 from evolution.settings.setting import Setting
 
@@ -147,6 +148,18 @@ class ExperimentConfig(BaseModel):
     )
     weight_init: StrictFloat = Field(
         5.0, gt=0, le=1e6, description="first weights are uniform within +- this"
+    )
+    validation_starts: StrictInt = Field(
+        N_VALIDATION,
+        ge=1,
+        le=STARTS_MAX,
+        description="fresh starts on which the champion is chosen",
+    )
+    test_starts: StrictInt = Field(
+        N_TEST,
+        ge=2,
+        le=STARTS_MAX,
+        description="other fresh starts on which the champion is tested",
     )
     optimizer: OptimizerConfig
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from evolution.judging.held_out_starts import N_VALIDATION
 from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
 from evolution.pages.words import NOTHING, evaluations, label, robot_name, spread
 from evolution.report.measures import shown_robots
@@ -81,12 +80,18 @@ def what_was_run_section(data: StudyData) -> list[Block]:
             f"millions, median [quartiles]; {data.steps} a trial at most, fewer for "
             "robots that crash, and where racing breaks off who can only lose. "
             "Choosing the champion comes on top, for every algorithm: "
-            f"{N_VALIDATION} trials of each candidate, which are the best "
+            f"{_validation_starts(data)} trials of each candidate, which are the best "
             f"{BEST_OF_POPULATION:.0%} of the last population and the last "
             f"{LATEST_BEST} that raised the run's best, some of them the same."
         ),
     ]
     return blocks
+
+
+def _validation_starts(data: StudyData) -> str:
+    """How many starts chose the champions, of all experiments."""
+    numbers = sorted({config.validation_starts for config in data.configs.values()})
+    return " or ".join(map(str, numbers))
 
 
 def _spent(data: StudyData, name: str) -> str:
