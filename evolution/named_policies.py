@@ -128,7 +128,7 @@ def _best_individuals(run: RunDirectory, generations: str) -> list[NamedPolicy]:
             )
     config, best = run.stored_config(), files.read_arrays(path)
     genomes, fitness = (best.get(name, np.empty(0)) for name in ("genomes", "fitness"))
-    n, n_genes = fitness.size, config.network.n_genes
+    n, n_genes = fitness.size, config.topology.n_genes
     if not n or fitness.shape != (n,) or genomes.shape != (n, n_genes):
         raise UserError(
             f"'{path}': expected genomes (generations, {n_genes}) and fitness "
@@ -140,7 +140,7 @@ def _best_individuals(run: RunDirectory, generations: str) -> list[NamedPolicy]:
     return [
         NamedPolicy(
             str(run.path),
-            config.network.decode(genomes[generation]),
+            config.topology.decode(genomes[generation]),
             config.task,
             config.robot,
             config.arena,

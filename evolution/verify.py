@@ -147,7 +147,7 @@ def _most_believed(
     best = files.read_arrays(run.best_individuals)
     try:
         genome = best["genomes"][best["fitness"].argmax()]
-        policy = config.network.decode(genome)
+        policy = config.topology.decode(genome)
     except (KeyError, ValueError, IndexError) as error:
         raise UserError(f"'{run.best_individuals}' is damaged: {error}") from None
     mean = judges.of(config.robot, config.setting).test(policy, config.test_starts).mean
@@ -160,10 +160,13 @@ def _edited(
     config: ExperimentConfig,
     judges: "Judges",
 ) -> Iterator[str]:
-    """Whether robot or arena have been edited since."""
+    """Whether robot, arena or own parts have been edited since."""
     now = dict(judges.of(config.robot, config.setting).scene.sha256)
     if champion.origin.mjcf_sha256 != now:
         yield "its robot or arena has been edited since"
+    for name, sha256 in champion.origin.own_sha256.items():
+        if config.own_parts.get(name) != sha256:
+            yield f"'{name}' has been edited since"
 
 
 def changes(provenance: dict) -> list[str]:

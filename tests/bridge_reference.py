@@ -107,8 +107,9 @@ def nominal(
     robots = DisturbedRobots(MujocoRobots(scene, 1, 1), met, task.control_step)
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     poses = [robots.poses()[0]]
-    for _ in range(n_steps):
-        observation = control_step(robots, policy, observation, task).observation
+    for k in range(n_steps):
+        step = control_step(robots, policy, observation, task, k)
+        observation = step.observation
         poses.append(robots.poses()[0])
     return np.array(poses)
 

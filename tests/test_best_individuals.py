@@ -68,7 +68,7 @@ def test_its_individuals_are_worth_what_it_says(tmp_path):
     rng = random_generator(experiment.config.seed, Purpose.STARTS, 0)
     starts = experiment.space.sample(rng, 1)
     fitness = evaluate(
-        experiment.engine, experiment.config.network, best["genomes"][:1], starts
+        experiment.engine, experiment.config.topology, best["genomes"][:1], starts
     ).fitness
     assert fitness[0] == best["fitness"][0] == first.best
 

@@ -64,12 +64,12 @@ def finished(request):
 def slow_trial(experiment: Evolution, genome, start) -> tuple[float, bool]:
     """Fitness of a genome's trial on one start, alone, and whether it crashed."""
     task = experiment.config.task
-    policy = experiment.config.network.decode(genome)
+    policy = experiment.config.topology.decode(genome)
     robots = MujocoRobots(experiment.scene, 1, 1)
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     fitness = 0.0
-    for _ in range(task.steps):
-        step = control_step(robots, policy, observation, task)
+    for k in range(task.steps):
+        step = control_step(robots, policy, observation, task, k)
         if step.reading.contact[0]:
             return fitness, True
         fitness += float(step.fitness[0])
@@ -111,7 +111,7 @@ def test_candidates_are_the_top_tenth_and_the_best_so_far(finished):
 
 def test_the_latest_twenty_of_the_best_so_far_are_candidates():
     experiment = Evolution(tiny("ga"))
-    rng, genes = np.random.default_rng(1), experiment.config.network.n_genes
+    rng, genes = np.random.default_rng(1), experiment.config.topology.n_genes
     told = rng.random(20)
     experiment.optimizer.ask()
     experiment.optimizer.tell(told)
@@ -174,7 +174,7 @@ def test_the_champion_is_best_on_the_validation_starts(finished):
 def test_stored_fitness_does_not_choose_the_champion():
     """A lucky draw is a candidate, and loses to who is better on fresh starts."""
     experiment = Evolution(tiny("ga", steps=10))
-    genes = experiment.config.network.n_genes
+    genes = experiment.config.topology.n_genes
     # fast and straight ahead; standing still
     fast, still = np.zeros(genes), np.zeros(genes)
     fast[32:36], still[32:36] = 5.0, -5.0
@@ -200,11 +200,11 @@ def test_held_out_against_a_slow_loop(finished):
     starts = starts_for_test(experiment.space)[:25]
     np.testing.assert_array_equal(judge.starts(25), starts)
     # drives straight on, so that some of the trials crash
-    genome = np.zeros(config.network.n_genes)
+    genome = np.zeros(config.topology.n_genes)
     genome[32:36] = 5.0
     trials = [slow_trial(experiment, genome, start) for start in starts]
     fitness = [trial[0] for trial in trials]
-    report = judge.test(config.network.decode(genome), 25)
+    report = judge.test(config.topology.decode(genome), 25)
     assert report.mean == np.mean(fitness)
     assert report.mean == pytest.approx(statistics.mean(fitness), rel=1e-12)
     assert report.standard_deviation == pytest.approx(
@@ -235,9 +235,9 @@ def test_the_champion_file_loads_and_acts_bit_for_bit(written):
     champion = choose_champion(experiment.engine, experiment)
     stored = load_controller(directory.champion)
     assert stored.genome.tobytes() == champion.genome.tobytes()
-    assert stored.network == experiment.config.network
+    assert stored.network == experiment.config.topology
     observation = np.random.default_rng(3).random((100, 8))
-    own = experiment.config.network.decode(champion.genome)
+    own = experiment.config.topology.decode(champion.genome)
     assert stored.controller(observation).tobytes() == own(observation).tobytes()
     # alone as in a crowd
     alone = [stored.controller(row) for row in observation]
@@ -248,7 +248,7 @@ def test_the_champion_file_holds_every_score(written):
     experiment, directory = written
     champion = choose_champion(experiment.engine, experiment)
     stored = load_controller(directory.champion)
-    policy = experiment.config.network.decode(champion.genome)
+    policy = experiment.config.topology.decode(champion.genome)
     tests = {
         robot: judge.test(policy, 30)
         for robot, judge in judges_of(experiment.config).items()
@@ -257,7 +257,7 @@ def test_the_champion_file_holds_every_score(written):
     # what evolution believed in most, on the robot that it was evolved on
     genome, believed = most_believed(experiment)
     judge = judges_of(experiment.config)["epuck_planar"]
-    worth = judge.test(experiment.config.network.decode(genome), 30)
+    worth = judge.test(experiment.config.topology.decode(genome), 30)
     assert Scores.read(stored.scores, directory.champion) == Scores(
         stored=champion.stored_fitness,
         validation=champion.validation_fitness,

@@ -93,10 +93,13 @@ COMMON = {
     "randomise": False,
     "calibration": None,
     "start_clearance": 0.01,
+    "network": "feedforward",
     "hidden": 4,
     "biases": False,
     "weight_bound": 5.0,
     "weight_init": 5.0,
+    "validation_starts": 200,
+    "test_starts": 1000,
 }
 
 
@@ -185,7 +188,7 @@ def test_derived_objects_hold_the_configs_values(name):
         "sensor_range": 0.03,
         "speeds": {"forward": 0.1, "turn": 2.0},
     }
-    assert asdict(config.network) == {"hidden": 3, "biases": True}
+    assert config.topology.to_dict() == {"hidden": 3, "biases": True}
     assert asdict(config.search_space) == {
         # (8 sensors + bias) * 3 hidden + (3 hidden + bias) * 2 actions
         "genes": 35,

@@ -80,7 +80,7 @@ def test_generations_are_tested_one_by_one(finished, tmp_path, capsys):
     judge = Judges().of("epuck_planar", config.setting)
     genomes = read_arrays(finished / "best_individuals.npz")["genomes"]
     for genome, test in zip(genomes, tests, strict=True):
-        assert judge.test(config.network.decode(genome), 20).mean == test["mean"]
+        assert judge.test(config.topology.decode(genome), 20).mean == test["mean"]
 
 
 def test_the_hand_written_follower_follows(capsys):

@@ -130,7 +130,7 @@ def slow_trial(scene, policy, start, task: TaskParameters) -> tuple[float, int, 
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     fitness = 0.0
     for i in range(task.steps):
-        step = control_step(robots, policy, observation, task)
+        step = control_step(robots, policy, observation, task, i)
         if step.reading.contact[0]:
             return fitness, i + 1, True
         fitness += float(step.fitness[0])
@@ -147,7 +147,7 @@ def test_a_generations_record_against_a_slow_loop():
     rng = random_generator(config.seed, Purpose.STARTS, 1)
     starts = experiment.space.sample(rng, 3)
     for genome in experiment.optimizer.population:
-        controller = config.network.decode(genome)
+        controller = config.topology.decode(genome)
         trials = [
             slow_trial(experiment.scene, controller, start, config.task)
             for start in starts

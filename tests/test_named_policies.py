@@ -108,7 +108,7 @@ def test_generations_are_the_best_individuals_of_a_run_that_goes_on(evolved):
     # each once, in the order asked for
     assert [policy.variant for policy in policies] == ["generation 2", "generation 0"]
     for policy, generation in zip(policies, (2, 0), strict=True):
-        expected = config.network.decode(checkpoint["best_genomes"][generation])
+        expected = config.topology.decode(checkpoint["best_genomes"][generation])
         seen = np.linspace(0, 1, 8)
         np.testing.assert_array_equal(policy.policy(seen), expected(seen))
         stored = checkpoint["records"][generation, 2]

@@ -14,7 +14,7 @@ from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters, Trials, run_trials
-from epuck_mj.step.fitness import STEP_FITNESS, STEP_FITNESS_MAX
+from epuck_mj.step.fitness import FORMULAS, step_fitness
 from epuck_mj.trials.recorder import record
 from evolution.judging import evaluation
 from evolution.judging.evaluation import ROUNDING, BatchEngine, Race, evaluate
@@ -57,20 +57,20 @@ def unit(*shape: int):
     return arrays(np.float64, shape, elements=st.floats(0, 1))
 
 
-@pytest.mark.parametrize("name", STEP_FITNESS)
+@pytest.mark.parametrize("name", FORMULAS)
 @given(drive=unit(20), turn=unit(20), left=st.booleans(), observation=unit(20, 8))
 def test_no_step_is_worth_more_than_the_most(name, drive, turn, left, observation):
     action = np.stack([drive, -turn if left else turn], axis=-1)
-    fitness = STEP_FITNESS[name](action, observation)
-    assert (fitness <= STEP_FITNESS_MAX).all()
+    fitness = FORMULAS[name](action, observation)
+    assert (fitness <= step_fitness(name).maximum).all()
     # so that what was earned never shrinks again
     assert (fitness >= 0).all()
 
 
-@pytest.mark.parametrize("name", STEP_FITNESS)
+@pytest.mark.parametrize("name", FORMULAS)
 def test_the_most_is_not_too_much(name):
     action, observation = np.array([1.0, 0.0]), np.zeros(8)
-    assert STEP_FITNESS[name](action, observation) == STEP_FITNESS_MAX
+    assert FORMULAS[name](action, observation) == step_fitness(name).maximum
 
 
 # trials that are broken off

@@ -31,6 +31,7 @@ from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.scene.model import load_scene
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import TaskParameters
+from epuck_mj.step.fitness import FORMULAS
 from epuck_mj.step.motors import STEP_ANGLE, actual_rates
 from epuck_mj.step.sensors import sensed_distance
 from tests.bridge_reference import at_control_steps, deviation, nominal, same_times
@@ -379,7 +380,7 @@ def test_trajectory_of_a_session(planar):
     )
     rates = trajectory.command / STEP_ANGLE
     np.testing.assert_allclose(rates, rates.round(), atol=1e-9)
-    expected = TASK.step_fitness(trajectory.action, trajectory.observation[1:])
+    expected = FORMULAS[TASK.fitness](trajectory.action, trajectory.observation[1:])
     np.testing.assert_array_equal(trajectory.fitness, expected)
 
 

@@ -10,6 +10,7 @@ from epuck_mj import SUITE, UserError
 from epuck_mj.environments.dm_control import FollowWalls, environment
 from epuck_mj.scene.model import load_scene
 from epuck_mj.step.control import TaskParameters
+from epuck_mj.step.fitness import FORMULAS
 
 TASKS = list(SUITE)
 SHORT = TaskParameters(steps=20)
@@ -121,9 +122,7 @@ def test_reward_is_the_step_fitness(name):
             time_step = env.step(action)
             if time_step.last():
                 break
-            expected = parameters.step_fitness(
-                action, time_step.observation["proximity"]
-            )
+            expected = FORMULAS[fitness](action, time_step.observation["proximity"])
             assert time_step.reward == expected
 
 

@@ -13,6 +13,7 @@ from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.scene.model import load_scene
 from epuck_mj.step.control import TaskParameters, run_trials
+from epuck_mj.step.fitness import FORMULAS
 from epuck_mj.step.motors import command
 from epuck_mj.step.sensors import observe, proximity
 from epuck_mj.trials.recorder import record
@@ -72,7 +73,7 @@ def test_rows_are_the_steps_of_one_trial(scene):
     np.testing.assert_array_equal(
         trajectory.command, command(trajectory.action, TASK.speeds)
     )
-    fitness = TASK.step_fitness(trajectory.action, seen[1:])
+    fitness = FORMULAS[TASK.fitness](trajectory.action, seen[1:])
     fitness[trajectory.contact[1:]] = 0
     np.testing.assert_array_equal(trajectory.fitness, fitness)
 

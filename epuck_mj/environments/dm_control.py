@@ -22,9 +22,11 @@ from dm_env import specs
 
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
+from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import START_CLEARANCE, TaskParameters
+from epuck_mj.step.fitness import StepFacts
 from epuck_mj.step.motors import command
 from epuck_mj.step.sensors import Reading, observe
 
@@ -126,7 +128,9 @@ class FollowWalls(base.Task):
         self._scene = scene
         self._space = space
         self._starts: Iterator[np.ndarray] = iter(starts)
-        self._action = np.zeros(2)
+        self._action = self._command = np.zeros(2)
+        self._k = 0
+        self._probe: ClearanceProbe | None = None
 
     def initialize_episode(self, physics: mujoco.Physics) -> None:
         """Put the robot at rest on the next start."""
@@ -137,7 +141,7 @@ class FollowWalls(base.Task):
             rng = np.random.default_rng(self.random.randint(2**32, dtype=np.uint32))
             start = self._space.sample(rng, 1)[0]
         physics.data.qpos[:] = self._scene.qpos(start)
-        self._action = np.zeros(2)
+        self._k = 0
         super().initialize_episode(physics)
 
     def action_spec(self, physics: mujoco.Physics) -> specs.BoundedArray:
@@ -154,20 +158,28 @@ class FollowWalls(base.Task):
     def before_step(self, action: np.ndarray, physics: mujoco.Physics) -> None:
         """Send the wheel speeds."""
         self._action = np.array(action, float)
-        physics.data.ctrl[self._scene.wheels] = command(
-            self._action, self.parameters.speeds
-        )
+        self._command = command(self._action, self.parameters.speeds)
+        physics.data.ctrl[self._scene.wheels] = self._command
+        self._k += 1
 
     def get_observation(self, physics: mujoco.Physics) -> OrderedDict[str, np.ndarray]:
         """What the network sees."""
         return OrderedDict(proximity=self._observe(physics))
 
     def get_reward(self, physics: mujoco.Physics) -> float:
-        """Step fitness; 0 in the step of a crash."""
-        if self.crashed(physics):
-            return 0.0
-        fitness = self.parameters.step_fitness(self._action, self._observe(physics))
-        return float(fitness)
+        """Step fitness."""
+        reading = self._reading(physics)
+        facts = StepFacts(
+            action=self._action,
+            command=self._command,
+            observation=self._observe(physics),
+            distance=reading.distance,
+            contact=reading.contact,
+            time=self._k * self.parameters.control_step,
+            poses=lambda: self._pose(physics),
+            clearances=lambda: self._clearance(physics),
+        )
+        return float(self.parameters.step_fitness(facts))
 
     def get_termination(self, physics: mujoco.Physics) -> float | None:
         """Discount 0 after a crash."""
@@ -176,6 +188,14 @@ class FollowWalls(base.Task):
     def crashed(self, physics: mujoco.Physics) -> bool:
         """Whether the shell touches a wall."""
         return bool(self._reading(physics).contact)
+
+    def _pose(self, physics: mujoco.Physics) -> np.ndarray:
+        return self._scene.poses(physics.data.qpos)
+
+    def _clearance(self, physics: mujoco.Physics) -> np.ndarray:
+        if self._probe is None:
+            self._probe = ClearanceProbe(self._scene, 1)
+        return self._probe.measure(self._pose(physics)).distance
 
     def _reading(self, physics: mujoco.Physics) -> Reading:
         return self._scene.reading(physics.data.sensordata)

@@ -10,8 +10,8 @@ import numpy as np
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.yaml_and_json import read_json
-from epuck_mj.policies.network import Controller, Network
-from epuck_mj.step.control import TaskParameters
+from epuck_mj.policies.topology import Topology, topology_from
+from epuck_mj.step.control import BatchPolicy, TaskParameters
 
 FORMAT = "epuck_mj.controller/1"
 
@@ -26,12 +26,14 @@ class Origin:
         start_clearance: least distance from the shell to a wall at a start [m]; None
             if the file does not say.
         mjcf_sha256: of each file compiled: `arena`, `robot`, and all others by name.
+        own_sha256: of the file of each own part, by the part's name.
     """
 
     robot: str
     arena: str
     start_clearance: float | None = None
     mjcf_sha256: dict[str, str] = field(default_factory=dict)
+    own_sha256: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
@@ -49,10 +51,11 @@ class Origin:
             raise ValueError(
                 f"expected a start_clearance in (0, 1] m, got {clearance!r}"
             )
-        hashes = fields.get("mjcf_sha256", {})
-        if not isinstance(hashes, dict):
-            raise ValueError(f"expected an object as mjcf_sha256, got {hashes!r}")
-        return cls(fields["robot"], fields["arena"], clearance, hashes)
+        hashes = [fields.get(key, {}) for key in ("mjcf_sha256", "own_sha256")]
+        for each in hashes:
+            if not isinstance(each, dict):
+                raise ValueError(f"expected an object of SHA-256, got {each!r}")
+        return cls(fields["robot"], fields["arena"], clearance, *hashes)
 
 
 @dataclass(frozen=True)
@@ -60,21 +63,21 @@ class ControllerFile:
     """A controller with all that is needed to use it.
 
     Attributes:
-        network: its shape.
+        network: what its genome decodes to.
         genome: its weights, `(genes,)`.
         task: what its trials were.
         origin: where it was evolved; `scene` in the JSON.
         scores: what is known of its worth, as the file says it.
     """
 
-    network: Network
+    network: Topology
     genome: np.ndarray
     task: TaskParameters
     origin: Origin
     scores: dict[str, Any]
 
     @property
-    def controller(self) -> Controller:
+    def controller(self) -> BatchPolicy:
         """The controller, ready to be called."""
         return self.network.decode(self.genome)
 
@@ -82,9 +85,11 @@ class ControllerFile:
         """The file's text; the genome comes back bit for bit."""
         # what is not known is left out
         origin = {k: v for k, v in asdict(self.origin).items() if v is not None}
+        if not self.origin.own_sha256:
+            del origin["own_sha256"]
         fields = {
             "format": FORMAT,
-            "network": asdict(self.network),
+            "network": self.network.to_dict(),
             "task": asdict(self.task),
             "scene": origin,
             "scores": self.scores,
@@ -104,7 +109,7 @@ class ControllerFile:
         for name in ("network", "task", "scene", "scores"):
             if not isinstance(fields.get(name), dict):
                 raise ValueError(f"expected an object as {name}")
-        network = Network(**fields["network"])
+        network = topology_from(fields["network"])
         genome = np.array(fields.get("genome", ()), float)
         if genome.shape != (network.n_genes,):
             raise ValueError(f"expected {network.n_genes} genes, got {genome.shape}")

@@ -4,7 +4,7 @@ Sums are written out term by term instead of as a matrix product: BLAS orders a 
 by the size of the batch, and a controller must act the same alone and in a crowd.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,10 @@ class Network:
             raise ValueError(f"expected hidden neurons, 1 or more, got {self.hidden!r}")
         if type(self.biases) is not bool:
             raise ValueError(f"expected biases true or false, got {self.biases!r}")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The topology as controller files say it."""
+        return asdict(self)
 
     @property
     def n_genes(self) -> int:

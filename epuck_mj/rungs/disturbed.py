@@ -92,6 +92,10 @@ class DisturbedRobots:
         """See `Robots.poses`."""
         return self._robots.poses()
 
+    def clearances(self) -> np.ndarray:
+        """See `Robot.clearances`."""
+        return self._robots.clearances()
+
     def _sensed(self, reading: Reading) -> Reading:
         """What the robots make of it; the truth goes along."""
         given, of = self._disturbances, self._of

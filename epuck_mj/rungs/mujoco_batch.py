@@ -5,11 +5,14 @@ robot does depends on its start and commands only: not on the number of threads,
 on which others share the batch.
 """
 
+from functools import cached_property
+
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
 from epuck_mj.rungs.bodies import body_fields, wheel_limits
+from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.sensors import Reading
 
@@ -35,6 +38,7 @@ class MujocoRobots:
         self._sensordata = self._batch.bind("sensordata")
         self._active = np.zeros(0, np.int32)
         self._embodied = False
+        self._threads = threads
 
     def reset(self, starts: np.ndarray) -> Reading:
         """Put a robot at rest on each start `(robots, 3)`: x, y [m], yaw [rad].
@@ -92,6 +96,15 @@ class MujocoRobots:
     def poses(self) -> np.ndarray:
         """Where the active robots are, `(active, 3)`: x, y [m], yaw [rad]."""
         return self.scene.poses(self._qpos[self._active])
+
+    def clearances(self) -> np.ndarray:
+        """From the active robots' shells to the nearest wall [m], `(active,)`."""
+        return self._probe.measure(self.poses()).distance
+
+    @cached_property
+    def _probe(self) -> ClearanceProbe:
+        """Made for those who ask."""
+        return ClearanceProbe(self.scene, self._threads)
 
     def _reading(self) -> Reading:
         return self.scene.reading(self._sensordata[self._active])

@@ -2,11 +2,13 @@
 
 import copy
 from collections.abc import Callable
+from functools import cached_property
 
 import mujoco
 import numpy as np
 
 from epuck_mj.rungs.bodies import body_fields, wheel_limits
+from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.sensors import Reading
 
@@ -69,6 +71,15 @@ class WatchedRobot:
         if self._embodied:
             self.embody(np.ones(1), np.ones(1))
             self._embodied = False
+
+    def clearances(self) -> np.ndarray:
+        """From the robot's shell to the nearest wall [m], `(1,)`."""
+        return self._probe.measure(self.poses()).distance
+
+    @cached_property
+    def _probe(self) -> ClearanceProbe:
+        """Made for those who ask."""
+        return ClearanceProbe(self.scene, 1)
 
     def _reading(self) -> Reading:
         return self.scene.reading(self.data.sensordata[None].copy())

@@ -2,17 +2,13 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field
-from typing import Any, Protocol, Self
+from typing import Any, Protocol, Self, runtime_checkable
 
 import numpy as np
 
 from epuck_mj.constants import PROXIMITY_RANGE
-from epuck_mj.step.fitness import (
-    STEP_FITNESS,
-    STEP_FITNESS_MAX,
-    StepFitness,
-    step_fitness,
-)
+from epuck_mj.host.own_parts import is_own
+from epuck_mj.step.fitness import FORMULAS, StepFacts, StepFitness, step_fitness
 from epuck_mj.step.motors import Speeds, command
 from epuck_mj.step.sensors import Reading, observe
 
@@ -35,6 +31,14 @@ class Robot(Protocol):
         """Drive for one control step; what is sensed at its end."""
         ...
 
+    def poses(self) -> np.ndarray:
+        """Where it is, `(..., 3)`: x, y [m], yaw [rad]; NaN if nobody knows."""
+        ...
+
+    def clearances(self) -> np.ndarray:
+        """From its shell to the nearest wall [m], `(...)`; NaN if nobody knows."""
+        ...
+
 
 class Robots(Robot, Protocol):
     """Robots that start where they are put and can be retired one by one."""
@@ -47,10 +51,6 @@ class Robots(Robot, Protocol):
         """Go on with those robots, of the ones still active, that `mask` names."""
         ...
 
-    def poses(self) -> np.ndarray:
-        """Where the active robots are, `(active, 3)`: x, y [m], yaw [rad]."""
-        ...
-
 
 @dataclass(frozen=True)
 class TaskParameters:
@@ -59,7 +59,7 @@ class TaskParameters:
     Attributes:
         steps: control steps of a trial.
         control_step: duration of a control step [s].
-        fitness: name of the step fitness, `product` or `literal`.
+        fitness: name of the step fitness: `product`, `literal` or `my.py:name`.
         sensor_range: where an obstacle stops being seen [m].
         speeds: what a full action means.
 
@@ -86,7 +86,7 @@ class TaskParameters:
                 raise ValueError(f"expected 1 to {STEPS_MAX} steps, got {task.steps!r}")
             if not all(0 < number < float("inf") for number in numbers):
                 raise ValueError(f"expected numbers above 0, got {numbers}")
-            if task.fitness not in list(STEP_FITNESS):
+            if task.fitness not in list(FORMULAS) and not is_own(str(task.fitness)):
                 raise ValueError(f"unknown fitness {task.fitness!r}")
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError(f"not the parameters of a task: {error}") from None
@@ -107,7 +107,7 @@ class ControlStep:
         command: wheel speeds sent [rad/s], `(..., 2)`.
         reading: what was sensed after the world moved.
         observation: the same as network input, `(..., 8)`: the next step's input.
-        fitness: step fitness, `(...)`; 0 in a step that ends in a crash.
+        fitness: step fitness, `(...)`.
     """
 
     action: np.ndarray
@@ -118,20 +118,28 @@ class ControlStep:
 
 
 def control_step(
-    robot: Robot, policy: Policy, observation: np.ndarray, task: TaskParameters
+    robot: Robot, policy: Policy, observation: np.ndarray, task: TaskParameters, k: int
 ) -> ControlStep:
-    """One control step from `observation` `(..., 8)` on."""
+    """Control step `k` of a trial, from 0 on, begun at `observation` `(..., 8)`."""
     action = policy(observation)
     wheels = command(action, task.speeds)
     reading = robot.step(wheels)
     seen = observe(reading.distance, task.sensor_range)
     # what a step is worth is not for noisy sensors to say
-    judged = seen
+    judged, distance = seen, reading.distance
     if reading.truth is not None:
-        judged = observe(reading.truth, task.sensor_range)
-    # a crash stops the calculation: its own step earns nothing
-    fitness = np.where(reading.contact, 0.0, task.step_fitness(action, judged))
-    return ControlStep(action, wheels, reading, seen, fitness)
+        judged, distance = observe(reading.truth, task.sensor_range), reading.truth
+    facts = StepFacts(
+        action=action,
+        command=wheels,
+        observation=judged,
+        distance=distance,
+        contact=reading.contact,
+        time=(k + 1) * task.control_step,
+        poses=robot.poses,
+        clearances=robot.clearances,
+    )
+    return ControlStep(action, wheels, reading, seen, task.step_fitness(facts))
 
 
 def drive(
@@ -145,9 +153,10 @@ def drive(
         first: what was sensed there, before anything moved.
         task: what a trial is.
     """
+    policy = started(policy, 1)
     observation = observe(first.distance, task.sensor_range)
-    for _ in range(task.steps):
-        step = control_step(robot, policy, observation, task)
+    for k in range(task.steps):
+        step = control_step(robot, policy, observation, task, k)
         observation = step.observation
         yield step
         if step.reading.contact.any():
@@ -200,6 +209,23 @@ class BatchPolicy(Protocol):
         ...
 
 
+@runtime_checkable
+class Remembering(Protocol):
+    """A policy that carries a state from one control step to the next."""
+
+    def started(self, n: int | None) -> BatchPolicy:
+        """The policy of `n` robots on their starts, which remember nothing yet.
+
+        None is one robot without an axis for it.
+        """
+        ...
+
+
+def started(policy: Any, n: int | None) -> Any:
+    """A policy, or a batch policy, at the start of `n` trials; see `Remembering`."""
+    return policy.started(n) if isinstance(policy, Remembering) else policy
+
+
 class Everybody:
     """A batch policy whose members are all the same."""
 
@@ -214,6 +240,11 @@ class Everybody:
     def __getitem__(self, index: np.ndarray | slice) -> Self:
         """Itself."""
         return self
+
+    def started(self, n: int | None) -> BatchPolicy:
+        """See `Remembering`: each robot has memories of its own, if any."""
+        policy = self._policy
+        return policy.started(n) if isinstance(policy, Remembering) else self
 
 
 def run_trials(
@@ -232,7 +263,8 @@ def run_trials(
         starts: poses `(trials, 3)`: x, y [m], yaw [rad].
         task: what a trial is.
         lost: asked after every step which trials to break off, uncrashed, with what
-            they have earned so far; None lets all of them live.
+            they have earned so far; None lets all of them live, as a step fitness
+            without a maximum does.
         watcher: told of starts and steps; None if nobody watches.
     """
     n_trials = len(starts)
@@ -240,12 +272,14 @@ def run_trials(
     steps = np.zeros(n_trials, int)
     crashed = np.zeros(n_trials, bool)
     active = np.arange(n_trials)
+    maximum = task.step_fitness.maximum
+    policy = started(policy, n_trials)
     reading = robots.reset(starts)
     observation = observe(reading.distance, task.sensor_range)
     if watcher is not None:
         watcher.started(reading, observation)
     for k in range(task.steps):
-        step = control_step(robots, policy, observation, task)
+        step = control_step(robots, policy, observation, task, k)
         observation = step.observation
         if watcher is not None:
             watcher.stepped(k, active, step)
@@ -253,9 +287,9 @@ def run_trials(
         steps[active] += 1
         alive = ~step.reading.contact
         crashed[active] = ~alive
-        if lost is not None:
+        if lost is not None and maximum is not None:
             most = fitness.copy()
-            most[active[alive]] += (task.steps - 1 - k) * STEP_FITNESS_MAX
+            most[active[alive]] += (task.steps - 1 - k) * maximum
             alive &= ~lost(most)[active]
         # those who are done leave; everything kept per robot follows
         if not alive.all():

@@ -1,22 +1,100 @@
-"""Step fitness: what a control step is worth, in [0, 1].
+"""Step fitness: what a control step is worth.
 
-Both forms read equation (2) of the paper. Its prose ("maximize linear velocity
+Both shipped forms read equation (2) of the paper. Its prose ("maximize linear velocity
 while minimizing both the angular velocity and robot-distance to the wall") is
 `product`; its print, where closeness only softens the price of turning, is
-`literal`, whose optimum is driving circles far from any wall.
+`literal`, whose optimum is driving circles far from any wall. Another one is a
+function in a file of the user's, `my.py:name`.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from epuck_mj.errors import UserError
+from epuck_mj.host.own_parts import failure, is_own, own_part
 
-StepFitness = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
-STEP_FITNESS_MAX = 1.0
-"""No control step is worth more."""
+@dataclass(frozen=True)
+class StepFacts:
+    """What is known of a control step of robots `(...)` once it is over.
+
+    Attributes:
+        action: what the policy decided, `(..., 2)`: v in [0, 1], w in [-1, 1].
+        command: wheel speeds sent [rad/s], `(..., 2)`.
+        observation: network input without noise, `(..., 8)`: 0 near, 1 free.
+        distance: metres along each ray without noise, `(..., 8)`; negative where
+            nothing was hit.
+        contact: whether the robot touches a wall, `(...)`: its trial ends here.
+        time: since the start, at the end of the step [s].
+        poses: gives `pose` when it is asked for.
+        clearances: gives `clearance` when it is asked for.
+    """
+
+    action: np.ndarray
+    command: np.ndarray
+    observation: np.ndarray
+    distance: np.ndarray
+    contact: np.ndarray
+    time: float
+    poses: Callable[[], np.ndarray]
+    clearances: Callable[[], np.ndarray]
+
+    @property
+    def pose(self) -> np.ndarray:
+        """Where the robots are, `(..., 3)`: x, y [m], yaw [rad]; NaN if unknown."""
+        return self.poses()
+
+    @property
+    def clearance(self) -> np.ndarray:
+        """From the shell to the nearest wall [m], `(...)`, 0.2 at most; NaN if unknown.
+
+        It costs about as much as the control step itself.
+        """
+        return self.clearances()
+
+
+@dataclass(frozen=True)
+class StepFitness:
+    """A step fitness and what is known of it.
+
+    Attributes:
+        name: as configurations call it.
+        function: from what is known of a step to its worth, `(...)`.
+        maximum: no step is worth more; None if that is not known, and then individuals
+            cannot race.
+    """
+
+    name: str
+    function: Callable[[StepFacts], np.ndarray]
+    maximum: float | None
+
+    def __call__(self, facts: StepFacts) -> np.ndarray:
+        """What the step is worth, `(...)`.
+
+        Raises:
+            UserError: if the function fails, gives another shape, or more than its
+                maximum.
+        """
+        try:
+            worth = np.asarray(self.function(facts), float)
+        except Exception as error:
+            raise UserError(f"fitness '{self.name}' {failure(error)}") from None
+        if worth.shape != facts.contact.shape:
+            raise UserError(
+                f"fitness '{self.name}': expected one value a robot, shape "
+                f"{facts.contact.shape}, got shape {worth.shape}"
+            )
+        if self.maximum is not None and worth.size and worth.max() > self.maximum:
+            raise UserError(
+                f"fitness '{self.name}': expected at most its maximum, "
+                f"{self.maximum:g}, got {worth.max():g}"
+            )
+        return worth
 
 
 def fast(action: np.ndarray) -> np.ndarray:
@@ -49,18 +127,54 @@ def literal(action: np.ndarray, observation: np.ndarray) -> np.ndarray:
     return fast(action) * (1.0 - turning(action) * close(observation))
 
 
-STEP_FITNESS: MappingProxyType[str, StepFitness] = MappingProxyType(
+Formula = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+FORMULAS: MappingProxyType[str, Formula] = MappingProxyType(
     {"product": product, "literal": literal}
 )
+"""The shipped forms, of action and observation; none is worth more than 1 a step."""
 
 
 def step_fitness(name: str) -> StepFitness:
-    """The step fitness of that name.
+    """The step fitness of that name, a shipped one or `my.py:name`.
+
+    The maximum of an own one is the attribute `maximum` of its function.
 
     Raises:
         UserError: if there is none.
     """
-    if name not in STEP_FITNESS:
-        available = ", ".join(sorted(STEP_FITNESS))
-        raise UserError(f"unknown fitness '{name}'; available: {available}")
-    return STEP_FITNESS[name]
+    if name in FORMULAS or is_own(name):
+        return _step_fitness(name)
+    available = ", ".join(sorted(FORMULAS))
+    raise UserError(
+        f"unknown fitness '{name}'; available: {available}, or my.py:name for a "
+        "function of your own"
+    )
+
+
+@cache
+def _step_fitness(name: str) -> StepFitness:
+    if name in FORMULAS:
+        return StepFitness(name, _until_a_crash(FORMULAS[name]), 1.0)
+    function: Any = own_part(name).value
+    if not callable(function):
+        raise UserError(f"fitness '{name}': expected a function, got {function!r}")
+    maximum = getattr(function, "maximum", None)
+    if maximum is not None and not isinstance(maximum, int | float):
+        raise UserError(
+            f"fitness '{name}': expected a number as its maximum, got {maximum!r}"
+        )
+    own: Any = function
+    return StepFitness(name, own, maximum)
+
+
+def _until_a_crash(formula: Formula) -> Callable[[StepFacts], np.ndarray]:
+    """A formula; the step that ends in a crash earns nothing.
+
+    Source: paper, section 4: a crash stops the calculation.
+    """
+
+    def fitness(facts: StepFacts) -> np.ndarray:
+        return np.where(facts.contact, 0.0, formula(facts.action, facts.observation))
+
+    return fitness

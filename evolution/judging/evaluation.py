@@ -14,11 +14,17 @@ from typing import Protocol
 
 import numpy as np
 
-from epuck_mj.policies.network import Controller, Network
+from epuck_mj.policies.topology import Topology
 from epuck_mj.rungs.disturbed import disturbed
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.model import Scene
-from epuck_mj.step.control import TaskParameters, Trials, run_trials
+from epuck_mj.step.control import (
+    BatchPolicy,
+    TaskParameters,
+    Trials,
+    run_trials,
+    started,
+)
 from epuck_mj.step.disturbances import Disturbances
 
 CAPACITY = 512
@@ -91,7 +97,7 @@ class Work:
         disturbances: of the trials; None for ideal robots.
     """
 
-    controller: Controller
+    controller: BatchPolicy
     starts: np.ndarray
     race: Race | None = None
     disturbances: Disturbances | None = None
@@ -179,9 +185,10 @@ class DmControlEngine:
         fitness, steps = np.zeros(n), np.zeros(n, int)
         crashed = np.zeros(n, bool)
         for i in range(n):
-            policy, time_step = work.controller[i], env.reset()
+            policy, time_step = started(work.controller[i : i + 1], 1), env.reset()
             while not time_step.last():
-                time_step = env.step(policy(time_step.observation["proximity"]))
+                observation = time_step.observation["proximity"]
+                time_step = env.step(policy(observation[None])[0])
                 fitness[i] += time_step.reward
                 steps[i] += 1
             crashed[i] = task.crashed(env.physics)
@@ -190,7 +197,7 @@ class DmControlEngine:
 
 def evaluate(
     engine: Engine,
-    network: Network,
+    topology: Topology,
     genomes: np.ndarray,
     starts: np.ndarray,
     to_beat: np.ndarray | None = None,
@@ -200,7 +207,7 @@ def evaluate(
 
     Args:
         engine: what runs the trials.
-        network: shape of the genomes.
+        topology: what genomes decode to.
         genomes: `(individuals, genes)`.
         starts: poses `(trials, 3)`, x, y [m], yaw [rad]: the same for everybody.
         to_beat: fitness `(individuals,)` below which nobody cares how far below;
@@ -208,7 +215,7 @@ def evaluate(
         disturbances: of the trials, the same for everybody; None for ideal robots.
     """
     shape = (len(genomes), len(starts))
-    controller = network.decode(np.repeat(genomes, len(starts), axis=0))
+    controller = topology.decode(np.repeat(genomes, len(starts), axis=0))
     race = None if to_beat is None else Race(to_beat, len(starts))
     everybody = None if disturbances is None else disturbances.tiled(len(genomes))
     everywhere = np.tile(starts, (len(genomes), 1))

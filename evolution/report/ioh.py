@@ -53,7 +53,7 @@ def export_histories(data: StudyData, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / "README.md", NOTE)
     for name, runs in data.with_runs.items():
-        genes = data.configs[name].network.n_genes
+        genes = data.configs[name].topology.n_genes
         path = (
             f"data_f{FUNCTION_ID}_{FUNCTION}/IOHprofiler_f{FUNCTION_ID}_DIM{genes}.dat"
         )

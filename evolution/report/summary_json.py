@@ -24,7 +24,8 @@ from evolution.report.sections.comparisons import pair_rows
 from evolution.report.sections.cost_of_targets import target_rows
 from evolution.report.sections.how_to_get_every_number_again import commands, origins
 from evolution.report.sections.success import success_rows
-from evolution.settings.config import ExperimentConfig, differences, flat
+from evolution.settings.comparison import differences, flat
+from evolution.settings.config import ExperimentConfig
 from evolution.statistics.estimates import quartiles, rank_correlation
 from evolution.study.data import StudyData
 

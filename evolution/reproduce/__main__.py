@@ -11,7 +11,7 @@ from pathlib import Path
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse, shell_command
-from epuck_mj.step.fitness import STEP_FITNESS
+from epuck_mj.step.fitness import FORMULAS
 from evolution.report.__main__ import report_study
 from evolution.study.__main__ import study
 
@@ -84,7 +84,7 @@ def reproduce_paper(argv: Sequence[str]) -> int:
     main_study, *others = studies
     config = next(iter(main_study.configs.values()))
     try:
-        unevolved = [first_generation(config, name) for name in STEP_FITNESS]
+        unevolved = [first_generation(config, name) for name in FORMULAS]
     except UserError as error:
         # the arena of another machine; all else can be shown
         print(f"missing: the first generation: {error}", file=sys.stderr)

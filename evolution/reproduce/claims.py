@@ -20,7 +20,7 @@ from evolution.reproduce.verdicts import (
     of_most,
     of_order,
 )
-from evolution.settings.config import differences
+from evolution.settings.comparison import differences
 from evolution.study.config import StudyConfig, find_study
 from evolution.study.data import StudyData
 

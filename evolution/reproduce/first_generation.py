@@ -44,7 +44,7 @@ def first_generation(config: ExperimentConfig, fitness: str) -> FirstGeneration:
     evolution = Evolution(config)
     record = next(evolution.run())
     judge = Judge(evolution.scene, evolution.space, config.task)
-    best = config.network.decode(evolution.best_genomes[0])
+    best = config.topology.decode(evolution.best_genomes[0])
     test = judge.test(best, FRESH_STARTS)
     return FirstGeneration(
         fitness, record.evaluations, record.best, test.mean, test.behaviour

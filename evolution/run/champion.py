@@ -78,7 +78,7 @@ def choose_champion(engine: Engine, evolution: Evolution) -> Champion:
         config.conditions, Purpose.VALIDATION, len(starts), config.steps
     )
     fitness = evaluate(
-        engine, config.network, genomes, starts, disturbances=met
+        engine, config.topology, genomes, starts, disturbances=met
     ).fitness
     best = int(fitness.argmax())
     return Champion(genomes[best], float(stored[best]), float(fitness[best]))

@@ -13,7 +13,8 @@ from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.yaml_and_json import read_json
 from evolution.run.provenance import now, to_json
-from evolution.settings.config import ExperimentConfig, differing_keys
+from evolution.settings.comparison import differing_keys
+from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import load_config
 
 if TYPE_CHECKING:
@@ -171,6 +172,13 @@ class RunDirectory:
                 f"cannot resume '{self.path}': its robot or arena has been edited "
                 f"since (SHA-256 {before}, now {after})"
             )
+        parts, others = first.get("own_sha256", {}), now["own_sha256"]
+        for name in others:
+            if parts.get(name) != others[name]:
+                raise UserError(
+                    f"cannot resume '{self.path}': '{name}' has been edited since "
+                    f"(SHA-256 {parts.get(name)}, now {others[name]})"
+                )
 
     def save(self, evolution: "Evolution", seconds: Sequence[float]) -> None:
         """Checkpoint, then what can be derived from it.

@@ -50,7 +50,7 @@ class Run:
         judges.add(config.robot, config.setting, scene, space)
         self._judges = judges.tested_on(config.robot, config.setting)
         self._provenance = provenance(
-            self.evolution.scene, argv, str(means.engine), means.threads
+            scene, config.own_parts, argv, str(means.engine), means.threads
         )
         self._threads = means.threads
 

@@ -80,7 +80,8 @@ class Evolution:
         if isinstance(engine, str):
             engine = make_engine(engine, self.scene, config, threads)
         self.engine = engine
-        self.racing = racing
+        # who can only lose is known only where there is a most to be won
+        self.racing = racing and config.task.step_fitness.maximum is not None
         self.optimizer = _optimizer(config)
         self.records: list[Record] = []
         self.best_genomes: list[np.ndarray] = []
@@ -117,7 +118,7 @@ class Evolution:
         to_beat = self.optimizer.to_beat() if self.racing else None
         evaluation = evaluate(
             self.engine,
-            config.network,
+            config.topology,
             genomes,
             starts,
             to_beat,
@@ -180,7 +181,7 @@ class Evolution:
     def _array(self, state: Mapping[str, np.ndarray], name: str) -> np.ndarray:
         """A float array of a state, one row per generation told."""
         generations = int(state.get("optimizer.generation", 0))
-        expected = (generations, ARRAYS[name] or self.config.network.n_genes)
+        expected = (generations, ARRAYS[name] or self.config.topology.n_genes)
         array = state.get(name)
         if array is None or array.shape != expected or generations < 1:
             got = "none" if array is None else f"shape {array.shape}"

@@ -154,7 +154,7 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
             _add(view, records)
             if not np.array_equal(genomes[-1], shown):
                 shown = genomes[-1]
-                policy = config.network.decode(shown)
+                policy = config.topology.decode(shown)
                 trajectory = record(scene, policy, start, config.task, met)
                 view.trial(
                     records[-1].evaluations,

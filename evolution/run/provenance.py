@@ -17,7 +17,11 @@ PACKAGES = ("mujoco", "dm-control", "numpy", "scipy", "pydantic", "rerun-sdk")
 
 
 def provenance(
-    scene: "Scene", argv: Sequence[str], engine: str, threads: int
+    scene: "Scene",
+    own_parts: Mapping[str, str],
+    argv: Sequence[str],
+    engine: str,
+    threads: int,
 ) -> dict[str, Any]:
     """Everything that could explain a difference, as JSON values.
 
@@ -34,6 +38,7 @@ def provenance(
         },
         "git": _git(),
         "mjcf_sha256": dict(scene.sha256),
+        "own_sha256": dict(own_parts),
         "platform": " ".join([platform.system(), *platform.libc_ver()]),
         "processor": processor(),
         "started": now(),

@@ -6,9 +6,9 @@ import numpy as np
 
 from epuck_mj.host import files
 from epuck_mj.policies.file import ControllerFile, Origin
-from epuck_mj.policies.network import Controller
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.model_files import WHEELED_ROBOT
+from epuck_mj.step.control import BatchPolicy
 from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.trials.recorder import record_trajectories
 from evolution.judging.evaluation import BatchEngine
@@ -45,7 +45,7 @@ def write_results(
     champion = choose_champion(
         BatchEngine(evolution.scene, config.task, threads), evolution
     )
-    policy = config.network.decode(champion.genome)
+    policy = config.topology.decode(champion.genome)
     n = config.test_starts
     met = held_out_disturbances(config.conditions, Purpose.TEST, n, config.steps)
     as_evolved = {
@@ -55,7 +55,7 @@ def write_results(
     }
     # what the run believed its best to be, and what that is worth on an ideal robot
     genome, stored = most_believed(evolution)
-    believed = next(iter(judges.values())).test(config.network.decode(genome), n)
+    believed = next(iter(judges.values())).test(config.topology.decode(genome), n)
     scores = Scores(
         stored=champion.stored_fitness,
         validation=champion.validation_fitness,
@@ -80,7 +80,7 @@ def _controller_file(
 ) -> ControllerFile:
     config = evolution.config
     return ControllerFile(
-        network=config.network,
+        network=config.topology,
         genome=champion.genome,
         task=config.task,
         origin=Origin(
@@ -88,6 +88,7 @@ def _controller_file(
             config.arena,
             config.start_clearance,
             dict(evolution.scene.sha256),
+            config.own_parts,
         ),
         scores=scores.to_dict(),
     )
@@ -111,7 +112,7 @@ def _draw_fitness(evolution: Evolution, directory: RunDirectory) -> None:
 def _show(
     evolution: Evolution,
     directory: RunDirectory,
-    policy: Controller,
+    policy: BatchPolicy,
     scene: Scene,
     starts: np.ndarray,
     met: Disturbances | None,

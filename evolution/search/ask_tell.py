@@ -110,10 +110,13 @@ def checked_state(
 class Optimizer(ABC):
     """A population-based maximiser that asks for fitness and is told.
 
-    An algorithm says how the first population is drawn, what is asked after it, what is
-    learnt from what is told, and which arrays all that depends on.
+    An algorithm draws the first population as it is made, and says in `propose` what is
+    asked after it, in `learn` what is made of what is told. What it keeps beside
+    population, fitness and `rng` goes into `arrays` and comes back by `load`; in
+    `to_beat` it says which fitness changes nothing, if it wants to be raced.
 
     Attributes:
+        rng: the source of all its randomness.
         name: the algorithm's.
         population: genomes `(population, genes)` after the last tell, read-only; before
             the first tell the initial ones. As many as there are: it may grow.
@@ -124,7 +127,7 @@ class Optimizer(ABC):
 
     def __init__(self, name: str, population: np.ndarray, rng: Generator) -> None:
         """Begin with genomes `(population, genes)` that have not been evaluated."""
-        self._rng = rng
+        self.rng = rng
         self._asked: np.ndarray | None = None
         self.name = name
         self.population = read_only(population)
@@ -132,11 +135,11 @@ class Optimizer(ABC):
         self.generation = 0
 
     @abstractmethod
-    def _propose(self) -> np.ndarray:
+    def propose(self) -> np.ndarray:
         """Genomes of the next generation, of every one but the first, `(n, genes)`."""
 
     @abstractmethod
-    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+    def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Make of the population and its fitness what they are after a generation.
 
         Args:
@@ -155,7 +158,7 @@ class Optimizer(ABC):
             AskTellError: the last genomes have not been told.
         """
         self._refuse_pending("ask")
-        self._asked = self._propose() if self.generation else self.population
+        self._asked = self.propose() if self.generation else self.population
         return self._asked.copy()
 
     def to_beat(self) -> np.ndarray:
@@ -167,7 +170,7 @@ class Optimizer(ABC):
         Raises:
             AskTellError: nothing was asked.
         """
-        return np.full(len(self._pending()), -np.inf)
+        return np.full(len(self.pending()), -np.inf)
 
     def tell(self, fitness: ArrayLike) -> None:
         """Accept the fitness `(n,)` of the genomes asked; NaN counts as -inf.
@@ -176,8 +179,8 @@ class Optimizer(ABC):
             AskTellError: nothing was asked, or another shape was expected; what was
                 asked can still be told.
         """
-        asked = self._pending()
-        self._learn(asked, checked_fitness(fitness, len(asked)))
+        asked = self.pending()
+        self.learn(asked, checked_fitness(fitness, len(asked)))
         self.generation += 1
         self._asked = None
 
@@ -188,7 +191,7 @@ class Optimizer(ABC):
             AskTellError: asked genomes have not been told.
         """
         self._refuse_pending("take the state")
-        return self._arrays()
+        return self.arrays()
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """Go on where `state` was taken, with the very same random stream.
@@ -200,33 +203,33 @@ class Optimizer(ABC):
         Raises:
             ValueError: not a state of this optimiser, which then stays as it was.
         """
-        arrays = checked_state(state, like=self._arrays())
-        rng = restored_generator(self._rng, arrays["generator"])
-        self._load(arrays)
-        self._rng = rng
+        arrays = checked_state(state, like=self.arrays())
+        rng = restored_generator(self.rng, arrays["generator"])
+        self.load(arrays)
+        self.rng = rng
         self.generation = int(arrays["generation"])
         self._asked = None
 
-    def _load(self, arrays: Mapping[str, np.ndarray]) -> None:
+    def load(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Take over the population, and what an algorithm adds to the state.
 
-        The arrays have the shapes and types of `_arrays`; whatever else can be wrong
+        The arrays have the shapes and types of `arrays`; whatever else can be wrong
         with them has to be found before anything is taken over.
         """
         self.population = read_only(arrays["population"])
         self.fitness = read_only(arrays["fitness"])
 
-    def _arrays(self) -> dict[str, np.ndarray]:
+    def arrays(self) -> dict[str, np.ndarray]:
         """The state."""
         return {
             "name": np.array(self.name),
             "generation": np.array(self.generation),
             "population": self.population.copy(),
             "fitness": self.fitness.copy(),
-            "generator": generator_state(self._rng),
+            "generator": generator_state(self.rng),
         }
 
-    def _pending(self) -> np.ndarray:
+    def pending(self) -> np.ndarray:
         """The genomes `(n, genes)` that wait for their fitness.
 
         Raises:

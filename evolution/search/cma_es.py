@@ -102,18 +102,18 @@ class CmaEs(Optimizer):
         refuse_wide_steps(parameters.sigma, space)
         self._parameters = parameters
         self._space = space
-        self._rng = rng
+        self.rng = rng
         # What the whole search follows from, together with what will be told.
         self._birth = generator_state(rng)
         self._told = [np.empty(0)]
         self._cma = self._started(parameters.population)
-        super().__init__("cma-es", self._propose(), rng)
+        super().__init__("cma-es", self.propose(), rng)
 
     def next_size(self) -> int:
         """See `Optimizer.next_size`."""
         return self._cma.population_size
 
-    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+    def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Make the generation asked the current one; start again if it is time."""
         # it minimises
         costs = (-made_finite(told)).tolist()
@@ -132,9 +132,9 @@ class CmaEs(Optimizer):
         """
         # As long as it is; all the rest is as in any other state.
         n_told = np.size(state["told"]) if "told" in state else 0
-        like = {**self._arrays(), "told": np.empty(n_told)}
+        like = {**self.arrays(), "told": np.empty(n_told)}
         arrays = checked_state(state, like=like)
-        rng = restored_generator(self._rng, arrays["generator"])
+        rng = restored_generator(self.rng, arrays["generator"])
         replayed = CmaEs(self._parameters, self._space, rng)
         told, generations = arrays["told"], int(arrays["generation"])
         while len(told) >= replayed.next_size():
@@ -151,7 +151,8 @@ class CmaEs(Optimizer):
         # All of it: another search has begun and come as far as this.
         vars(self).update(vars(replayed))
 
-    def _arrays(self) -> dict[str, np.ndarray]:
+    def arrays(self) -> dict[str, np.ndarray]:
+        """See `Optimizer.arrays`."""
         return {
             "name": np.array(self.name),
             "generation": np.array(self.generation),
@@ -176,16 +177,16 @@ class CmaEs(Optimizer):
         # fitness of the best and of the median individual of each of its generations
         self._history: list[tuple[float, float]] = []
         space = self._space
-        mean = self._rng.uniform(space.init_lower, space.init_upper, size=space.genes)
+        mean = self.rng.uniform(space.init_lower, space.init_upper, size=space.genes)
         return CMA(
             mean=mean,
             sigma=self._parameters.sigma,
             bounds=np.tile([space.lower, space.upper], (space.genes, 1)),
-            seed=int(self._rng.integers(2**32)),
+            seed=int(self.rng.integers(2**32)),
             population_size=population,
         )
 
-    def _propose(self) -> np.ndarray:
+    def propose(self) -> np.ndarray:
         """The next genomes of the present search `(next_size(), genes)`."""
         return np.array([self._cma.ask() for _ in range(self.next_size())])
 

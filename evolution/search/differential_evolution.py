@@ -157,7 +157,7 @@ class DifferentialEvolution(Optimizer):
         Without a limit in the initial population and where parents are re-evaluated,
         which changes what is to be beaten.
         """
-        asked = self._pending()
+        asked = self.pending()
         if self._reevaluates():
             return np.full(len(asked), -np.inf)
         return self.fitness.copy()
@@ -166,14 +166,14 @@ class DifferentialEvolution(Optimizer):
         """Whether this generation asks parents and trials together."""
         return self._parameters.reevaluate_parents and self.generation > 0
 
-    def _propose(self) -> np.ndarray:
+    def propose(self) -> np.ndarray:
         """The trials, after their parents if those are re-evaluated."""
         trials = self._trials()
         if self._reevaluates():
             return np.concatenate([self.population, trials])
         return trials
 
-    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+    def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Let each trial replace its parent if it is strictly better."""
         n = len(self.population)
         # survivors carry the fitness they were compared with, -inf at first
@@ -188,11 +188,11 @@ class DifferentialEvolution(Optimizer):
     def _trials(self) -> np.ndarray:
         """One trial for each individual `(population, genes)`."""
         parameters, space, genomes = self._parameters, self._space, self.population
-        parents = distinct_parents(len(genomes), self._rng)
+        parents = distinct_parents(len(genomes), self.rng)
         # On ties the first is the best.
         best = int(np.argmax(self.fitness))
         mutate = STRATEGIES[parameters.strategy]
         mutants = mutate(genomes, best, parents, parameters.scale)
-        trials = binomial_crossover(genomes, mutants, parameters.crossover, self._rng)
+        trials = binomial_crossover(genomes, mutants, parameters.crossover, self.rng)
         keep_inside = BOUNDS_RULES[parameters.bounds_rule]
-        return keep_inside(trials, genomes, space.lower, space.upper, self._rng)
+        return keep_inside(trials, genomes, space.lower, space.upper, self.rng)

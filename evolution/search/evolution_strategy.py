@@ -110,18 +110,18 @@ class EvolutionStrategy(Optimizer):
 
         Any other offspring is a failure, and by how much is forgotten.
         """
-        self._pending()
+        self.pending()
         return self.fitness.copy()
 
-    def _propose(self) -> np.ndarray:
+    def propose(self) -> np.ndarray:
         """One offspring of each parent `(lineages, genes)`."""
-        parents, space, rng = self.population, self._space, self._rng
+        parents, space, rng = self.population, self._space, self.rng
         steps = rng.standard_normal(parents.shape)
         offspring = parents + self._sigma[:, np.newaxis] * steps
         keep_inside = BOUNDS_RULES[self._parameters.bounds_rule]
         return keep_inside(offspring, parents, space.lower, space.upper, rng)
 
-    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+    def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Let offspring replace their parents if strictly better; adapt sigma."""
         if self.generation == 0:
             self.fitness = read_only(told)
@@ -134,9 +134,11 @@ class EvolutionStrategy(Optimizer):
         lower, upper = self._space.lower, self._space.upper
         self._sigma = one_fifth_rule(self._sigma, success, lower, upper)
 
-    def _load(self, arrays: Mapping[str, np.ndarray]) -> None:
-        super()._load(arrays)
+    def load(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """See `Optimizer.load`."""
+        super().load(arrays)
         self._sigma = arrays["sigma"]
 
-    def _arrays(self) -> dict[str, np.ndarray]:
-        return {**super()._arrays(), "sigma": self._sigma.copy()}
+    def arrays(self) -> dict[str, np.ndarray]:
+        """See `Optimizer.arrays`."""
+        return {**super().arrays(), "sigma": self._sigma.copy()}

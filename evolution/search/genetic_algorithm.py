@@ -169,23 +169,25 @@ class GeneticAlgorithm(Optimizer):
         self._chromosomes = rng.integers(2, size=shape).astype(bool)
         super().__init__("ga", self._decoded(self._chromosomes), rng)
 
-    def _propose(self) -> np.ndarray:
+    def propose(self) -> np.ndarray:
         """Offspring of the generation last told, after its elites."""
         # those of the population are of no more use
         self._chromosomes = self._offspring()
         return self._decoded(self._chromosomes)
 
-    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+    def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Make the generation asked the current one."""
         self.population, self.fitness = read_only(asked), read_only(told)
 
-    def _load(self, arrays: Mapping[str, np.ndarray]) -> None:
+    def load(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """See `Optimizer.load`."""
         self._chromosomes = arrays["chromosomes"]
         self.population = read_only(self._decoded(self._chromosomes))
         self.fitness = read_only(arrays["fitness"])
 
-    def _arrays(self) -> dict[str, np.ndarray]:
-        arrays = super()._arrays()
+    def arrays(self) -> dict[str, np.ndarray]:
+        """See `Optimizer.arrays`."""
+        arrays = super().arrays()
         # of which the genomes follow
         del arrays["population"]
         return {**arrays, "chromosomes": self._chromosomes.copy()}
@@ -196,7 +198,7 @@ class GeneticAlgorithm(Optimizer):
 
     def _offspring(self) -> np.ndarray:
         """The next generation's chromosomes `(population, length)`, elites first."""
-        parameters, rng = self._parameters, self._rng
+        parameters, rng = self._parameters, self.rng
         # Of equals the first is the better.
         best_first = np.argsort(-self.fitness, kind="stable")
         elites = self._chromosomes[best_first[: parameters.elites]]

@@ -68,13 +68,13 @@ class RandomSearch(Optimizer):
 
     def to_beat(self) -> np.ndarray:
         """See `Optimizer.to_beat`: the lowest fitness kept, -inf at first."""
-        return np.full(len(self._pending()), self.fitness.min())
+        return np.full(len(self.pending()), self.fitness.min())
 
-    def _propose(self) -> np.ndarray:
+    def propose(self) -> np.ndarray:
         """Fresh genomes `(population, genes)`."""
-        return self._drawn(self._rng)
+        return self._drawn(self.rng)
 
-    def _learn(self, asked: np.ndarray, told: np.ndarray) -> None:
+    def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Keep the best of those kept and those asked; of equals the older."""
         if self.generation == 0:
             self.fitness = read_only(told)

@@ -1,4 +1,4 @@
-"""The table of the optimisers that are shipped.
+"""The table of the optimisers: those that are shipped, and a user's own.
 
 The modules behind it do not know this one: `ask_tell` has what they share,
 `search_space` the box, one module each the algorithms. The baselines beside the paper's
@@ -12,10 +12,14 @@ are random search, (1+1)-ES and CMA-ES.
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import field, fields, is_dataclass, make_dataclass
+from functools import cache
 from typing import Any
 
 from numpy.random import Generator
 
+from epuck_mj.errors import UserError
+from epuck_mj.host.own_parts import failure, is_own, own_part
 from evolution.search.ask_tell import AskTellError, Optimizer
 from evolution.search.cma_es import CmaEs, CmaEsParameters
 from evolution.search.differential_evolution import (
@@ -67,6 +71,65 @@ ALGORITHMS: Mapping[str, type[OptimizerParameters]] = {
 """The kinds of parameters by what configurations call their `algorithm`."""
 
 
+def parameters_kind(algorithm: str) -> type:
+    """The dataclass of an algorithm's parameters: a shipped one's, or `my.py:Class`'s.
+
+    Raises:
+        UserError: if there is no such algorithm, or it is not as `own_parameters` says.
+    """
+    if algorithm in ALGORITHMS:
+        return ALGORITHMS[algorithm]
+    if is_own(algorithm):
+        return own_parameters(algorithm)
+    raise UserError(
+        f"unknown algorithm '{algorithm}'; available: {', '.join(ALGORITHMS)}, or "
+        "my.py:Class for an optimiser of your own"
+    )
+
+
+@cache
+def own_parameters(algorithm: str) -> type:
+    """The parameters of a user's subclass of `Optimizer`, and which one it is.
+
+    They are a frozen dataclass, the attribute `Parameters` of that class, in which
+    everything has a default.
+
+    Raises:
+        UserError: if they are anything else.
+    """
+    kind = own_part(algorithm).value
+    if not (isinstance(kind, type) and issubclass(kind, Optimizer)):
+        raise UserError(
+            f"optimiser '{algorithm}': expected a subclass of "
+            f"evolution.search.ask_tell.Optimizer, got {kind!r}"
+        )
+    parameters = getattr(kind, "Parameters", None)
+    if not (isinstance(parameters, type) and is_dataclass(parameters)):
+        raise UserError(
+            f"optimiser '{algorithm}': expected a frozen dataclass as its attribute "
+            f"Parameters, got {parameters!r}"
+        )
+    try:
+        parameters()
+        return make_dataclass(
+            parameters.__name__,
+            [("algorithm", str, field(default=algorithm))],
+            bases=(parameters,),
+            # read by the configuration: a misspelt key is refused
+            namespace={
+                "__pydantic_config__": {"extra": "forbid"},
+                "__doc__": parameters.__doc__,
+                "__module__": parameters.__module__,
+            },
+            frozen=True,
+        )
+    except Exception as error:
+        raise UserError(
+            f"optimiser '{algorithm}': its Parameters {failure(error)}; expected a "
+            "frozen dataclass in which everything has a default"
+        ) from None
+
+
 def make_optimizer(
     parameters: OptimizerParameters, space: SearchSpace, rng: Generator
 ) -> Optimizer:
@@ -79,5 +142,19 @@ def make_optimizer(
 
     Raises:
         ValueError: the optimiser cannot search this space.
+        UserError: a user's optimiser fails.
     """
-    return MAKERS[type(parameters)](parameters, space, rng)
+    if not is_own(parameters.algorithm):
+        return MAKERS[type(parameters)](parameters, space, rng)
+    kind = own_part(parameters.algorithm).value
+    # its own Parameters, which know nothing of algorithms
+    keys = [each.name for each in fields(kind.Parameters)]
+    own = {key: getattr(parameters, key) for key in keys}
+    try:
+        return kind(kind.Parameters(**own), space, rng)
+    except ValueError:
+        raise
+    except Exception as error:
+        raise UserError(
+            f"optimiser '{parameters.algorithm}' {failure(error)}"
+        ) from None

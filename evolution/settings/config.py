@@ -1,95 +1,41 @@
 """What an experiment is: typed, frozen, read from YAML, unknown keys refused."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import fields
-from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from functools import cache
+from typing import Any, Self
 
 from pydantic import (
     BaseModel,
-    BeforeValidator,
     ConfigDict,
     Field,
     StrictBool,
     StrictFloat,
     StrictInt,
     ValidationError,
+    create_model,
     model_validator,
 )
-from tyro.constructors import PrimitiveConstructorSpec
 
 from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
 from epuck_mj.errors import UserError
+from epuck_mj.host.own_parts import is_own, located, own_part
 from epuck_mj.host.yaml_and_json import parse_yaml, to_yaml
 from epuck_mj.policies.network import Network
+from epuck_mj.policies.topology import OwnNetwork, Topology
 from epuck_mj.scene.model_files import absolute
-from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.conditions import Conditions, NoiseLevel
 from epuck_mj.step.control import START_CLEARANCE, STEPS_MAX, TaskParameters
 from epuck_mj.step.motors import Speeds
 from evolution.judging.held_out_starts import N_TEST, N_VALIDATION, STARTS_MAX
-from evolution.search.table import ALGORITHMS, OptimizerParameters, SearchSpace
+from evolution.search.table import SearchSpace, own_parameters
+from evolution.settings.config_errors import one_line
+from evolution.settings.config_fields import (
+    FEEDFORWARD,
+    CalibrationConfig,
+    FitnessName,
+    NetworkName,
+    OptimizerConfig,
+)
 from evolution.settings.setting import Setting
-
-
-def _of_known_algorithm(value: Any) -> Any:
-    """`value`, which says whose parameters it holds.
-
-    Raises:
-        ValueError: if it does not.
-    """
-    if isinstance(value, dict):
-        algorithm = value.get("algorithm")
-    else:
-        algorithm = getattr(value, "algorithm", None)
-    # a list, which `in` cannot look up in a mapping, is no algorithm either
-    if algorithm not in list(ALGORITHMS):
-        raise ValueError(
-            f"expected a mapping with 'algorithm', one of {', '.join(ALGORITHMS)}"
-        )
-    return value
-
-
-OptimizerConfig = Annotated[
-    OptimizerParameters,
-    Field(discriminator="algorithm"),
-    BeforeValidator(_of_known_algorithm),
-]
-
-
-def _calibration(value: Any) -> Any:
-    """A calibration in the config itself, which is how one of a file is kept.
-
-    Raises:
-        ValueError: if it is none.
-    """
-    if value is None or isinstance(value, Calibration):
-        return value
-    if not isinstance(value, str):
-        return Calibration.from_dict(value)
-    try:
-        return Calibration.load(Path(value))
-    except UserError as error:
-        raise ValueError(str(error)) from None
-
-
-def _calibration_flag(value: str) -> Calibration | None:
-    """The file that a flag names; `none` is the robot of the books."""
-    return None if value == "none" else Calibration.load(Path(value))
-
-
-CalibrationConfig = Annotated[
-    Calibration | None,
-    BeforeValidator(_calibration),
-    # a flag takes the file only
-    PrimitiveConstructorSpec(
-        nargs=1,
-        metavar="PATH",
-        instance_from_str=lambda words: _calibration_flag(words[0]),
-        is_instance=lambda value: value is None or isinstance(value, Calibration),
-        str_from_instance=lambda value: ["none" if value is None else "as stored"],
-    ),
-]
 
 
 class ExperimentConfig(BaseModel):
@@ -110,8 +56,10 @@ class ExperimentConfig(BaseModel):
         300, ge=1, le=STEPS_MAX, description="control steps of a trial"
     )
     control_step: StrictFloat = Field(0.1, gt=0, description="control step [s]")
-    fitness: Literal["product", "literal"] = Field(
-        "product", description="step fitness: the paper's prose or its equation (2)"
+    fitness: FitnessName = Field(
+        "product",
+        description="step fitness: product, the paper's prose; literal, its equation "
+        "(2); or my.py:name, a function of your own",
     )
     v_max: StrictFloat = Field(
         SPEED_MAX, gt=0, description="forward speed at v = 1 [m/s]"
@@ -138,6 +86,11 @@ class ExperimentConfig(BaseModel):
         gt=0,
         le=1,
         description="least distance to a wall at a start [m]",
+    )
+    network: NetworkName = Field(
+        FEEDFORWARD,
+        description="feedforward, the paper's with hidden neurons and biases as below; "
+        "or my.py:Class, a network of your own",
     )
     hidden: StrictInt = Field(4, ge=1, description="hidden neurons")
     biases: StrictBool = Field(
@@ -196,15 +149,27 @@ class ExperimentConfig(BaseModel):
         return Setting(self.arena, self.task, self.start_clearance)
 
     @property
-    def network(self) -> Network:
-        """Shape of the controllers."""
-        return Network(self.hidden, self.biases)
+    def topology(self) -> Topology:
+        """What genomes decode to."""
+        if self.network == FEEDFORWARD:
+            return Network(self.hidden, self.biases)
+        return OwnNetwork(self.network)
+
+    @property
+    def own_parts(self) -> dict[str, str]:
+        """SHA-256 of the files of the user's own parts, by the parts' names.
+
+        Raises:
+            UserError: if one of them cannot be loaded.
+        """
+        names = (self.fitness, self.network, self.optimizer.algorithm)
+        return {name: own_part(name).sha256 for name in names if is_own(name)}
 
     @property
     def search_space(self) -> SearchSpace:
         """Where genomes may be."""
         return SearchSpace(
-            genes=self.network.n_genes,
+            genes=self.topology.n_genes,
             lower=-self.weight_bound,
             upper=self.weight_bound,
             init_lower=-self.weight_init,
@@ -213,15 +178,24 @@ class ExperimentConfig(BaseModel):
 
     def located(self) -> Self:
         """The config with paths that mean the same from anywhere."""
-        paths = {"robot": absolute(self.robot), "arena": absolute(self.arena)}
-        return self.model_copy(update=paths)
+        places = {
+            "robot": absolute(self.robot),
+            "arena": absolute(self.arena),
+            "fitness": located(self.fitness),
+            "network": located(self.network),
+        }
+        return self.model_copy(update=places)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As text: a user's classes are those of a file, not of a module."""
+        return type(self).from_yaml, (self.to_yaml(), "config")
 
     def to_yaml(self) -> str:
         """The resolved config: every key, in the order above."""
         return to_yaml(self.model_dump())
 
     @classmethod
-    def from_yaml(cls, text: str, where: str) -> Self:
+    def from_yaml(cls, text: str, where: str) -> "ExperimentConfig":
         """The config that `to_yaml` wrote; keys it did not know have their defaults.
 
         Raises:
@@ -230,82 +204,44 @@ class ExperimentConfig(BaseModel):
         return cls.parsed(parse_yaml(text, where), where)
 
     @classmethod
-    def parsed(cls, fields: Any, where: str) -> Self:
+    def parsed(cls, fields: Any, where: str) -> "ExperimentConfig":
         """The config that keys and values make.
 
         Raises:
             UserError: beginning with `where`, if they make none.
         """
+        kind, fields = _kind_for(fields)
         try:
-            return cls.model_validate(fields)
+            return kind.model_validate(fields)
         except ValidationError as error:
-            raise UserError(f"{where}: {one_line(error)}") from None
+            optimizer: Any = kind.model_fields["optimizer"].annotation
+            problem = one_line(error, list(kind.model_fields), optimizer)
+            raise UserError(f"{where}: {problem}") from None
 
 
-def differing_keys(stored: ExperimentConfig, asked: ExperimentConfig) -> list[str]:
-    """What two configs disagree about, a text for each key."""
-    return [
-        f"{key} (stored {values.get('stored')}, got {values.get('asked')})"
-        for key, values in differences({"stored": stored, "asked": asked}).items()
-    ]
+def _kind_for(fields: Any) -> tuple[type[ExperimentConfig], Any]:
+    """The class for keys and values, and these with an algorithm found from anywhere.
 
-
-def differences(
-    configs: Mapping[str, ExperimentConfig], without: Sequence[str] = ()
-) -> dict[str, dict[str, Any]]:
-    """Keys in which configs differ, and the value of each config that has the key.
-
-    Args:
-        configs: by name.
-        without: keys that may differ.
+    Raises:
+        UserError: if they name a user's optimiser that cannot be loaded.
     """
-    each = {name: flat(config) for name, config in configs.items()}
-    keys = dict.fromkeys(key for fields in each.values() for key in fields)
-    found = {
-        key: {name: fields[key] for name, fields in each.items() if key in fields}
-        for key in keys
-        if key not in without
-    }
-    return {
-        key: values
-        for key, values in found.items()
-        if len(values) < len(each) or len(set(map(repr, values.values()))) > 1
-    }
+    optimizer: Any = fields.get("optimizer") if isinstance(fields, dict) else None
+    algorithm = optimizer.get("algorithm") if isinstance(optimizer, dict) else None
+    if not (isinstance(algorithm, str) and is_own(algorithm)):
+        return ExperimentConfig, fields
+    algorithm = located(algorithm)
+    own = fields | {"optimizer": optimizer | {"algorithm": algorithm}}
+    return config_of_own_optimizer(algorithm), own
 
 
-def flat(config: ExperimentConfig) -> dict[str, Any]:
-    """Keys and values, the optimiser's as `optimizer.<key>`."""
-    fields = config.model_dump()
-    optimizer = fields.pop("optimizer")
-    return fields | {f"optimizer.{key}": value for key, value in optimizer.items()}
+@cache
+def config_of_own_optimizer(algorithm: str) -> type[ExperimentConfig]:
+    """`ExperimentConfig` with the parameters of a user's optimiser.
 
-
-def one_line(error: ValidationError) -> str:
-    """Everything a config got wrong, with the keys there are when one is unknown."""
-    parts = []
-    for detail in error.errors():
-        key = ".".join(str(part) for part in detail["loc"] if part not in ALGORITHMS)
-        if detail["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-            available = ", ".join(_keys(detail["loc"]))
-            parts.append(f"unknown key '{key}'; available: {available}")
-        elif detail["type"] == "missing":
-            parts.append(f"key '{key}' is missing")
-        elif not detail["loc"]:
-            # of several keys together
-            parts.append(detail["msg"].removeprefix("Value error, "))
-        else:
-            message = detail["msg"].removeprefix("Value error, ")
-            parts.append(f"{key}: {message}, got {_shown(detail['input'])}")
-    return "; ".join(parts)
-
-
-def _keys(loc: tuple[int | str, ...]) -> list[str]:
-    """The keys that could stand where the unknown key at `loc` stands."""
-    if len(loc) == 1:
-        return list(ExperimentConfig.model_fields)
-    return [field.name for field in fields(ALGORITHMS[str(loc[1])])]
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) < 60 else f"{text[:57]}..."
+    Raises:
+        UserError: if it cannot be loaded.
+    """
+    kind = own_parameters(algorithm)
+    return create_model(
+        ExperimentConfig.__name__, __base__=ExperimentConfig, optimizer=(kind, ...)
+    )

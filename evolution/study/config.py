@@ -10,7 +10,8 @@ from typing import Self
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import find
 from epuck_mj.host.yaml_and_json import read_yaml, to_yaml
-from evolution.settings.config import ExperimentConfig, differing_keys
+from evolution.settings.comparison import differing_keys
+from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config, shipped_with
 
 KEYS = ("experiments", "common")

@@ -15,7 +15,8 @@ from epuck_mj.policies.wall_follower import YARDSTICK
 from evolution.judging.scores import HeldOut, KnownScores, Scores
 from evolution.run.directory import RunDirectory
 from evolution.run.generation_loop import HISTORY
-from evolution.settings.config import ExperimentConfig, differing_keys
+from evolution.settings.comparison import differing_keys
+from evolution.settings.config import ExperimentConfig
 from evolution.study.config import seeds_text
 from evolution.study.directory import StudyDirectory
 

@@ -9,7 +9,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from epuck_mj.bridge.drive.robot import Moment, RealRobot
-from epuck_mj.step.control import ControlStep, Policy, TaskParameters, control_step
+from epuck_mj.step.control import (
+    ControlStep,
+    Policy,
+    TaskParameters,
+    control_step,
+    started,
+)
 from epuck_mj.step.motors import STEP_ANGLE
 from epuck_mj.step.sensors import Reading, observe
 from epuck_mj.trials.trajectory import Trajectory, hidden_outputs
@@ -69,9 +75,10 @@ class Session:
         self.reading = robot.begin()
         self.start = robot.last
         observation = observe(self.reading.distance, self.task.sensor_range)
+        policy = started(policy, None)
         for number in range(1, n_steps + 1):
             began, waited = clock(), robot.waited
-            control = control_step(robot, policy, observation, self.task)
+            control = control_step(robot, policy, observation, self.task, number - 1)
             observation = control.observation
             compute = clock() - began - (robot.waited - waited)
             step = Step(number, control, robot.last, compute)

@@ -9,7 +9,7 @@ from epuck_mj.policies.wall_follower import YARDSTICK
 from evolution.pages.blocks import Block, Code, Heading, Listing, Paragraph, Table
 from evolution.pages.words import NOTHING, command_line, label
 from evolution.run.directory import RunDirectory
-from evolution.settings.config import differences
+from evolution.settings.comparison import differences
 from evolution.study.data import StudyData
 
 

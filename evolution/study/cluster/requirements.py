@@ -12,6 +12,7 @@ from distributed import get_worker
 import epuck_mj
 import evolution
 from epuck_mj.errors import UserError
+from epuck_mj.host.own_parts import own_part
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.settings.config import ExperimentConfig
@@ -28,20 +29,24 @@ class Requirements:
         robot: shipped robot, or the path of an MJCF file.
         arena: shipped arena, or the path of an MJCF file.
         control_step: duration of a control step [s].
+        own: names of the user's own parts.
         facts: what has to be the same everywhere, and what it is here.
     """
 
     robot: str
     arena: str
     control_step: float
+    own: tuple[str, ...]
     facts: tuple[tuple[str, str], ...]
 
     @classmethod
-    def here(cls, robot: str, arena: str, control_step: float) -> Self:
+    def here(
+        cls, robot: str, arena: str, control_step: float, own: tuple[str, ...] = ()
+    ) -> Self:
         """As it is on this machine.
 
         Raises:
-            UserError: if robot or arena cannot be used.
+            UserError: if robot or arena cannot be used, or an own part not be loaded.
         """
         facts = {package: version(package) for package in DECIDING}
         facts["code of epuck-mj"] = code()
@@ -49,7 +54,9 @@ class Requirements:
             scene = load_scene(name, arena, control_step)
             for part, sha256 in scene.sha256.items():
                 facts[f"{part} of '{name}' in '{arena}'"] = sha256[:12]
-        return cls(robot, arena, control_step, tuple(facts.items()))
+        for name in own:
+            facts[f"'{name}'"] = own_part(name).sha256[:12]
+        return cls(robot, arena, control_step, own, tuple(facts.items()))
 
     def refuse_another(self) -> None:
         """On a worker: refuse to give other bits than the machine that asks would get.
@@ -57,7 +64,7 @@ class Requirements:
         Raises:
             UserError: naming what differs.
         """
-        here = Requirements.here(self.robot, self.arena, self.control_step)
+        here = Requirements.here(self.robot, self.arena, self.control_step, self.own)
         ours, theirs = dict(here.facts), dict(self.facts)
         differing = [
             f"{name} (there {ours.get(name)}, here {theirs.get(name)})"
@@ -89,4 +96,5 @@ def requirements_of(config: ExperimentConfig) -> Requirements:
     Raises:
         UserError: if robot or arena cannot be used.
     """
-    return Requirements.here(config.robot, config.arena, config.control_step)
+    own = tuple(config.own_parts)
+    return Requirements.here(config.robot, config.arena, config.control_step, own)

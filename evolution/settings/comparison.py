@@ -1,0 +1,44 @@
+"""In what configurations differ."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from evolution.settings.config import ExperimentConfig
+
+
+def differing_keys(stored: ExperimentConfig, asked: ExperimentConfig) -> list[str]:
+    """What two configs disagree about, a text for each key."""
+    return [
+        f"{key} (stored {values.get('stored')}, got {values.get('asked')})"
+        for key, values in differences({"stored": stored, "asked": asked}).items()
+    ]
+
+
+def differences(
+    configs: Mapping[str, ExperimentConfig], without: Sequence[str] = ()
+) -> dict[str, dict[str, Any]]:
+    """Keys in which configs differ, and the value of each config that has the key.
+
+    Args:
+        configs: by name.
+        without: keys that may differ.
+    """
+    each = {name: flat(config) for name, config in configs.items()}
+    keys = dict.fromkeys(key for fields in each.values() for key in fields)
+    found = {
+        key: {name: fields[key] for name, fields in each.items() if key in fields}
+        for key in keys
+        if key not in without
+    }
+    return {
+        key: values
+        for key, values in found.items()
+        if len(values) < len(each) or len(set(map(repr, values.values()))) > 1
+    }
+
+
+def flat(config: ExperimentConfig) -> dict[str, Any]:
+    """Keys and values, the optimiser's as `optimizer.<key>`."""
+    fields = config.model_dump()
+    optimizer = fields.pop("optimizer")
+    return fields | {f"optimizer.{key}": value for key, value in optimizer.items()}

@@ -1,0 +1,49 @@
+"""What is wrong with a configuration, in one line."""
+
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any
+
+from pydantic import ValidationError
+
+from evolution.search.table import ALGORITHMS
+
+
+def one_line(error: ValidationError, keys: Sequence[str], optimizer: type) -> str:
+    """Everything a config got wrong, with the keys there are when one is unknown.
+
+    Args:
+        error: of the config.
+        keys: that a config may have.
+        optimizer: dataclass of the parameters of a user's optimiser; of shipped ones,
+            the error says which.
+    """
+    parts = []
+    for detail in error.errors():
+        key = ".".join(str(part) for part in detail["loc"] if part not in ALGORITHMS)
+        if detail["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+            available = ", ".join(_keys(detail["loc"], keys, optimizer))
+            parts.append(f"unknown key '{key}'; available: {available}")
+        elif detail["type"] == "missing":
+            parts.append(f"key '{key}' is missing")
+        elif not detail["loc"]:
+            # of several keys together
+            parts.append(detail["msg"].removeprefix("Value error, "))
+        else:
+            message = detail["msg"].removeprefix("Value error, ")
+            parts.append(f"{key}: {message}, got {_shown(detail['input'])}")
+    return "; ".join(parts)
+
+
+def _keys(
+    loc: tuple[int | str, ...], keys: Sequence[str], optimizer: type
+) -> Sequence[str]:
+    """The keys that could stand where the unknown key at `loc` stands."""
+    if len(loc) == 1:
+        return keys
+    return [field.name for field in fields(ALGORITHMS.get(str(loc[1]), optimizer))]
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) < 60 else f"{text[:57]}..."

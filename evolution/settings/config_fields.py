@@ -1,0 +1,93 @@
+"""Types of the keys of a configuration that are more than numbers."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, Field
+from tyro.constructors import PrimitiveConstructorSpec
+
+from epuck_mj.errors import UserError
+from epuck_mj.host.own_parts import is_own
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.fitness import FORMULAS
+from evolution.search.table import ALGORITHMS, OptimizerParameters
+
+FEEDFORWARD = "feedforward"
+"""The paper's network, with hidden neurons and biases as a configuration says."""
+
+
+def _one_of(*shipped: str) -> AfterValidator:
+    """A name that is shipped, or that of an own part."""
+
+    def known(name: str) -> str:
+        if name in shipped or is_own(name):
+            return name
+        raise ValueError(f"expected {', '.join(shipped)} or my.py:name")
+
+    return AfterValidator(known)
+
+
+FitnessName = Annotated[str, _one_of(*FORMULAS)]
+
+NetworkName = Annotated[str, _one_of(FEEDFORWARD)]
+
+
+def _of_known_algorithm(value: Any) -> Any:
+    """`value`, which says whose parameters it holds.
+
+    Raises:
+        ValueError: if it does not.
+    """
+    if isinstance(value, dict):
+        algorithm = value.get("algorithm")
+    else:
+        algorithm = getattr(value, "algorithm", None)
+    # a list, which `in` cannot look up in a mapping, is no algorithm either
+    if algorithm not in list(ALGORITHMS):
+        raise ValueError(
+            f"expected a mapping with 'algorithm', one of {', '.join(ALGORITHMS)}, or "
+            "my.py:Class"
+        )
+    return value
+
+
+OptimizerConfig = Annotated[
+    OptimizerParameters,
+    Field(discriminator="algorithm"),
+    BeforeValidator(_of_known_algorithm),
+]
+
+
+def _calibration(value: Any) -> Any:
+    """A calibration in the config itself, which is how one of a file is kept.
+
+    Raises:
+        ValueError: if it is none.
+    """
+    if value is None or isinstance(value, Calibration):
+        return value
+    if not isinstance(value, str):
+        return Calibration.from_dict(value)
+    try:
+        return Calibration.load(Path(value))
+    except UserError as error:
+        raise ValueError(str(error)) from None
+
+
+def _calibration_flag(value: str) -> Calibration | None:
+    """The file that a flag names; `none` is the robot of the books."""
+    return None if value == "none" else Calibration.load(Path(value))
+
+
+CalibrationConfig = Annotated[
+    Calibration | None,
+    BeforeValidator(_calibration),
+    # a flag takes the file only
+    PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="PATH",
+        instance_from_str=lambda words: _calibration_flag(words[0]),
+        is_instance=lambda value: value is None or isinstance(value, Calibration),
+        str_from_instance=lambda value: ["none" if value is None else "as stored"],
+    ),
+]
