@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, make_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -35,6 +35,7 @@ class Options:
             one-plus-one-es, cma-es, de-best-calibrated, de-best-randomised,
             ga-randomised) or a YAML file; it comes first.
         config: the experiment's keys; a flag wins over the YAML.
+        optimizer: an optimiser of your own, my.py:Class, in place of the experiment's.
         output: run directory, runs/<experiment>-seed-<seed> if not given.
         resume: run directory to go on with.
         threads: threads that step the robots; 0 is one per core. Changes no result.
@@ -49,6 +50,7 @@ class Options:
 
     experiment: tyro.conf.Positional[str]
     config: ExperimentConfig
+    optimizer: str | None = None
     output: Path | None = None
     resume: Path | None = None
     threads: int = 0
@@ -80,7 +82,10 @@ def evolve(argv: Sequence[str]) -> int:
             print(f"{directory.path} is finished; {_replay(directory)}")
             return 0
     else:
+        # a user's optimiser gives the run its class's name
         stem = Path(options.experiment).stem
+        if options.optimizer is not None:
+            stem = options.optimizer.rpartition(":")[2]
         default = Path("runs") / f"{stem}-seed-{options.config.seed}"
         directory = RunDirectory(options.output or default)
         directory.refuse_if_used()
@@ -108,15 +113,21 @@ def _options(argv: Sequence[str]) -> Options:
     """The options, on top of the experiment or of the run to be resumed."""
     first = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
     first.add_argument("--resume", type=Path, nargs="?")
-    resume = first.parse_known_args(argv)[0].resume
+    first.add_argument("--optimizer", nargs="?")
+    known = first.parse_known_args(argv)[0]
+    resume, optimizer = known.resume, known.optimizer
     named = bool(argv) and not argv[0].startswith("-")
     experiment = argv[0] if named else DEFAULT_EXPERIMENT
     if resume is not None and not named:
         config = RunDirectory(resume).stored_config()
     else:
         config = load_config(find_config(experiment))
-    default = Options(experiment, config)
-    options = parse(Options, f"python -m {MODULE}", argv, default)
+    if optimizer is not None:
+        # its parameters are flags as well
+        own = config.model_dump() | {"optimizer": {"algorithm": optimizer}}
+        config = ExperimentConfig.parsed(own, "--optimizer")
+    default = _kind(config)(experiment, config, optimizer=optimizer)
+    options = parse(type(default), f"python -m {MODULE}", argv, default)
     if options.experiment != experiment:
         first = shell_command(MODULE, options.experiment, "...")
         raise UserError(f"the experiment comes first: {first}")
@@ -125,6 +136,16 @@ def _options(argv: Sequence[str]) -> Options:
     if options.resume is not None and options.output is not None:
         raise UserError("expected --resume or --output, got both")
     return options
+
+
+def _kind(config: ExperimentConfig) -> type[Options]:
+    """Options whose flags are the keys of that config, a user's optimiser's as well."""
+    if type(config) is ExperimentConfig:
+        return Options
+    keys = [("config", type(config))]
+    kind = make_dataclass("Options", keys, bases=(Options,), frozen=True)
+    kind.__doc__ = Options.__doc__
+    return kind
 
 
 def _carry_out(run: "Run", live: bool) -> int:

@@ -14,7 +14,7 @@ are random search, (1+1)-ES and CMA-ES.
 from collections.abc import Callable, Mapping
 from dataclasses import field, fields, is_dataclass, make_dataclass
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 from numpy.random import Generator
 
@@ -113,7 +113,7 @@ def own_parameters(algorithm: str) -> type:
         parameters()
         return make_dataclass(
             parameters.__name__,
-            [("algorithm", str, field(default=algorithm))],
+            [("algorithm", Literal[algorithm], field(default=algorithm))],
             bases=(parameters,),
             # read by the configuration: a misspelt key is refused
             namespace={
