@@ -15,12 +15,11 @@ from epuck_mj.policies.wall_follower import YARDSTICK
 from epuck_mj.step.conditions import ConditionFlags, Conditions
 from epuck_mj.step.disturbances import Disturbances
 from evolution.judging.held_out_starts import (
-    N_TEST,
-    STARTS_MAX,
     held_out_disturbances,
 )
 from evolution.judging.scores import HeldOut
 from evolution.named_policies import named_policies
+from evolution.settings.config_fields import N_TEST, STARTS_MAX
 from evolution.settings.randomness import Purpose
 from evolution.settings.setting import Setting
 

@@ -15,14 +15,13 @@ from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.disturbances import Disturbances
 from evolution.judging.held_out_starts import (
-    N_TEST,
-    N_VALIDATION,
     held_out_disturbances,
     starts_for_test,
     starts_for_validation,
 )
 from evolution.named_policies import NamedPolicy
 from evolution.replay.options import Options
+from evolution.settings.config_fields import N_TEST, N_VALIDATION
 from evolution.settings.randomness import Purpose
 
 

@@ -25,11 +25,13 @@ from epuck_mj.scene.model_files import absolute
 from epuck_mj.step.conditions import Conditions, NoiseLevel
 from epuck_mj.step.control import START_CLEARANCE, STEPS_MAX, TaskParameters
 from epuck_mj.step.motors import Speeds
-from evolution.judging.held_out_starts import N_TEST, N_VALIDATION, STARTS_MAX
 from evolution.search.table import SearchSpace, own_parameters
 from evolution.settings.config_errors import one_line
 from evolution.settings.config_fields import (
     FEEDFORWARD,
+    N_TEST,
+    N_VALIDATION,
+    STARTS_MAX,
     CalibrationConfig,
     FitnessName,
     NetworkName,
@@ -89,6 +91,9 @@ class ExperimentConfig(BaseModel):
     )
     network: NetworkName = Field(
         FEEDFORWARD,
+        N_TEST,
+        N_VALIDATION,
+        STARTS_MAX,
         description="feedforward, the paper's with hidden neurons and biases as below; "
         "or my.py:Class, a network of your own",
     )
@@ -188,7 +193,7 @@ class ExperimentConfig(BaseModel):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As text: a user's classes are those of a file, not of a module."""
-        return type(self).from_yaml, (self.to_yaml(), "config")
+        return ExperimentConfig.from_yaml, (self.to_yaml(), "config")
 
     def to_yaml(self) -> str:
         """The resolved config: every key, in the order above."""

@@ -12,6 +12,14 @@ from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.fitness import FORMULAS
 from evolution.search.table import ALGORITHMS, OptimizerParameters
 
+N_VALIDATION = 200
+"""Starts on which a champion is chosen, where a configuration says nothing else."""
+
+N_TEST = 1000
+"""Starts on which a champion is tested, where a configuration says nothing else."""
+
+STARTS_MAX = 100_000
+
 FEEDFORWARD = "feedforward"
 """The paper's network, with hidden neurons and biases as a configuration says."""
 
