@@ -20,7 +20,7 @@ from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Endpoint, Pty, Tcp, serve
 from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import scenario
-from epuck_mj.bridge.language import ascii
+from epuck_mj.bridge.language import ascii, binary
 from epuck_mj.bridge.language.protocol import RESYNC
 from epuck_mj.bridge.language.replies import Steps
 from epuck_mj.bridge.line.link import Link
@@ -162,7 +162,7 @@ def test_the_program_in_the_document(planar, tmp_path, capsys):
         exec(script.replace("/tmp/e-puck", port.name), {})
         assert emulator.body.standing
     out = capsys.readouterr().out
-    assert re.search(r"^Version 1\.2.*\nSteps\(left=3\d\d, right=-3\d\d\) Prox", out)
+    assert re.search(r"^Version 1\.2.*\nCycle\(.*left=3\d\d, right=-3\d\d\)", out)
 
 
 def test_one_host_after_the_other(endpoint, planar):
@@ -181,7 +181,7 @@ def test_a_port_vanishes_and_returns(endpoint, planar):
         link = Link(lambda: SerialPort(name))
         try:
             link.resync(time.monotonic() + PATIENCE)
-            link.ask(ascii.drive_order(300, 300))
+            link.ask(binary.echoed_cycle_packet(300, 300, True))
             with pytest.raises(LinkLost):
                 while True:
                     link.drain(time.monotonic() + 0.02)

@@ -86,10 +86,6 @@ class Line:
     what: str
 
 
-GREETING = Line(re.compile(re.escape(BANNER)), None, "the banner")
-"""The one line that is a reply to a reset, and bad news to everybody else."""
-
-
 class LinesParser(Generic[T]):
     """Parser of an ASCII reply: certain lines, one after the other.
 
@@ -132,7 +128,7 @@ class LinesParser(Generic[T]):
     def _take(self, line: bytes) -> None:
         awaited = self._awaited[0]
         self._refuse_long(line)
-        if BANNER in line and awaited is not GREETING:
+        if BANNER in line:
             raise RobotRestarted(awaited.what, line)
         if line.endswith(NOT_FOUND + b"\r"):
             raise BridgeError(awaited.what, line)
