@@ -17,7 +17,7 @@ import pytest
 from epuck_mj.bridge.failures import LinkLost
 from epuck_mj.bridge.fake.__main__ import fake
 from epuck_mj.bridge.fake.emulator import Emulator
-from epuck_mj.bridge.fake.endpoints import Endpoint, Pty, Tcp, serve
+from epuck_mj.bridge.fake.endpoints import Pty, Tcp, serve
 from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import scenario
 from epuck_mj.bridge.language import ascii, binary
@@ -36,7 +36,7 @@ from tests.processes import PATIENCE, python_process
 
 @contextmanager
 def behind(
-    endpoint: Endpoint,
+    endpoint: Pty | Tcp,
     emulator: Emulator,
     clock: Callable[[], float] = time.monotonic,
 ) -> Iterator[Emulator]:
@@ -54,7 +54,7 @@ def behind(
 
 
 def living(
-    endpoint: Endpoint,
+    endpoint: Pty | Tcp,
     scene: Scene,
     start=(0.0, 0.0, 0.0),
     robot="asercom",
@@ -219,7 +219,7 @@ def test_ports_that_cannot_be_made(tmp_path):
     first = Tcp(0)
     try:
         with pytest.raises(UserError, match="cannot listen on port"):
-            Tcp(first.port)
+            Tcp(int(first.name.rpartition(":")[2]))
         with pytest.raises(UserError, match="cannot listen on port 70000"):
             Tcp(70_000)
     finally:
