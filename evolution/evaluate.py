@@ -14,11 +14,7 @@ from epuck_mj.host.command_line import check_threads, main, parse
 from epuck_mj.policies.wall_follower import YARDSTICK
 from epuck_mj.step.conditions import ConditionFlags, Conditions
 from epuck_mj.step.disturbances import Disturbances
-from evolution.judging.held_out_starts import (
-    N_TEST,
-    STARTS_MAX,
-    held_out_disturbances,
-)
+from evolution.judging.held_out_starts import N_TEST, STARTS_MAX, held_out_disturbances
 from evolution.judging.scores import HeldOut
 from evolution.named_policies import named_policies
 from evolution.settings.randomness import Purpose
@@ -56,11 +52,7 @@ class Options:
 
 
 def evaluate_policies(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status.
-
-    Raises:
-        UserError: for anything the user can put right.
-    """
+    """Run the command line; its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv)
     if not 2 <= options.starts <= STARTS_MAX:
         raise UserError(f"expected 2 to {STARTS_MAX} starts, got {options.starts}")
@@ -98,11 +90,7 @@ def evaluate_policies(argv: Sequence[str]) -> int:
             )
             print(f"{candidate.name}, {Path(robot).name} in {Path(arena).name}")
             print(_described(test, steps), flush=True)
-            where = {
-                "name": candidate.name,
-                "robot": robot,
-                "arena": arena,
-            }
+            where = {"name": candidate.name, "robot": robot, "arena": arena}
             tests.append(where | asdict(conditions) | test.to_dict())
     if options.json is not None:
         with files.writing():

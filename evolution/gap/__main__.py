@@ -38,11 +38,7 @@ class GapOptions:
 
 
 def measure_gap(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status.
-
-    Raises:
-        UserError: for anything the user can put right.
-    """
+    """Run the command line; its exit status."""
     options = parse(GapOptions, "python -m evolution.gap", argv)
     for name, value in (("worlds", options.worlds), ("starts", options.starts)):
         if not 2 <= value <= NUMBER_MAX:
