@@ -74,9 +74,9 @@ def save_recording(
             log_arena(stream, scene.model)
             for trial, place in zip(trials, places, strict=True):
                 trajectory = trial.trajectory
-                clearance = probe.measure(trajectory.pose).distance
                 log_robot(stream, scene.model, place)
                 log_motion(stream, scene, trajectory, trial.task.sensor_range, place)
+                clearance = probe.measure(trajectory.pose).distance
                 log_signals(stream, trajectory, clearance, place)
         content = file.read_bytes() if file.exists() else b""
     # rerun only warns when it is switched off
