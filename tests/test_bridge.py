@@ -166,7 +166,7 @@ def test_over_wifi(planar, tmp_path, faults):
     endpoint = Tcp(0)
     seconds = "2" if not faults else "60"
     with living(endpoint, planar, AT_WALL, "wifi", faults) as emulator:
-        name = f"tcp://127.0.0.1:{endpoint.port}"
+        name = endpoint.name.replace("socket:", "tcp:")
         done = run(name, tmp_path / "log", "--seconds", seconds, disturbed=bool(faults))
         assert emulator.body.standing == (faults != "gone@1.5")
     status = {"": 0, "gone@1.5": 4}.get(faults, 3)
@@ -182,7 +182,7 @@ def test_over_wifi(planar, tmp_path, faults):
 def test_calibration_over_wifi(planar, tmp_path):
     endpoint = Tcp(0)
     with living(endpoint, planar, AT_WALL, "wifi"):
-        name = f"tcp://127.0.0.1:{endpoint.port}"
+        name = endpoint.name.replace("socket:", "tcp:")
         done = run(name, tmp_path / "log", "--seconds", "0.5", "--calibrate")
     assert (done.returncode, done.stderr) == (0, "")
     proximity = Trajectory.load(tmp_path / "log.npz").proximity

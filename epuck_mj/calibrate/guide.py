@@ -48,7 +48,7 @@ MISSES = (-360.0, 360.0)
 
 
 class Person:
-    """Who is at the robot."""
+    """Who is at the robot; UserError says that nobody answers any more."""
 
     def __init__(self, ask: Callable[[str], str], interruption: Interruption) -> None:
         """A person who was asked nothing yet.
@@ -61,19 +61,11 @@ class Person:
         self._interruption = interruption
 
     def ready(self, what: str) -> None:
-        """Wait until something is done.
-
-        Raises:
-            UserError: if nobody answers any more.
-        """
+        """Wait until something is done."""
         self._answer(f"{what}\nThen press Enter: ")
 
     def agrees(self, question: str) -> bool:
-        """Whether the person says yes; asked again until it is yes or no.
-
-        Raises:
-            UserError: if nobody answers any more.
-        """
+        """Whether the person says yes; asked again until it is yes or no."""
         while True:
             answer = self._answer(f"{question} [y/n]: ").lower()
             if answer in ("y", "yes", "n", "no"):
@@ -81,11 +73,7 @@ class Person:
             _say(f"expected y or n, got '{answer}'")
 
     def number(self, question: str, low: float, high: float) -> float:
-        """A number within limits; asked again until there is one.
-
-        Raises:
-            UserError: if nobody answers any more.
-        """
+        """A number within limits; asked again until there is one."""
         while True:
             answer = self._answer(f"{question}: ")
             try:

@@ -50,11 +50,7 @@ class Options:
 
 
 def view(argv: Sequence[str]) -> int:
-    """Watch; the exit status.
-
-    Raises:
-        UserError: for anything a user can put right.
-    """
+    """Watch; the exit status."""
     options = parse(Options, "python -m epuck_mj.view", argv)
     policy: Policy = WallFollower()
     task = TaskParameters()

@@ -4,7 +4,6 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
@@ -40,16 +39,6 @@ class Starts:
     poses: np.ndarray
     purpose: Purpose = Purpose.TEST
     first: int = 0
-
-    @classmethod
-    def none(cls) -> Self:
-        """No starts, for recorded trajectories."""
-        return cls((), np.zeros((0, 3)))
-
-    @classmethod
-    def from_pose(cls, pose: np.ndarray) -> Self:
-        """The start that a person asks for, `(3,)`; it meets what test start 0 does."""
-        return cls(("pose",), pose[None])
 
     def met(self, conditions: Conditions, steps: int) -> Disturbances | None:
         """What trials from here meet: as in the held-out test of all starts."""
@@ -128,12 +117,14 @@ def starts_for(
                 "expected --pose with x [m], y [m] and heading [degrees], got "
                 + " ".join(f"{number:g}" for number in options.pose)
             )
-        return Starts.from_pose(_pose(scene, *options.pose))
+        # it meets what test start 0 does
+        return Starts(("pose",), _pose(scene, *options.pose)[None])
     trials = 1 if options.trials is None else options.trials
     if trials < 1:
         raise UserError(f"expected at least 1 trial, got {trials}")
     if not policies:
-        return Starts.none()
+        # recorded trajectories have none
+        return Starts((), np.zeros((0, 3)))
     # the widest: a start that is free for one is free for all
     clearance = max(policy.start_clearance for policy in policies)
     spec = options.starts or f"test:0-{trials - 1}"

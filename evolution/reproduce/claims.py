@@ -218,10 +218,7 @@ def _follows(study: StudyData, name: str) -> Claim:
     tests = [run.scores.held_out[WHEELED_ROBOT] for run in runs]
     sample = 100 * known([test.following for test in tests])
     return _claim(
-        text,
-        sample,
-        lambda: of_most(sample >= 100 * FOLLOWED),
-        "share of trials",
+        text, sample, lambda: of_most(sample >= 100 * FOLLOWED), "share of trials"
     )
 
 

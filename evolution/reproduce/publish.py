@@ -44,13 +44,9 @@ def publish(argv: Sequence[str]) -> int:
     paper, *others = (str(path) for path in shipped(Path("results")))
     wheels = [argument for path in others for argument in ("--wheels", path)]
     reproduce_paper(["--study", paper, *wheels, "--output", "results"])
-    _write_readme()
-    return 0
-
-
-def _write_readme() -> None:
     text = with_tables(README_FILE.read_text(encoding="utf-8"), Path("results"))
     files.write_text(README_FILE, text)
+    return 0
 
 
 def shipped(results: Path) -> list[Path]:

@@ -55,11 +55,7 @@ class Session:
     steps: list[Step] = field(default_factory=list)
 
     def drive(
-        self,
-        robot: RealRobot,
-        policy: Policy,
-        n_steps: int,
-        clock: Callable[[], float],
+        self, robot: RealRobot, policy: Policy, n_steps: int, clock: Callable[[], float]
     ) -> Iterator[Step]:
         """Control steps as they happen; the robot is left as it drives.
 

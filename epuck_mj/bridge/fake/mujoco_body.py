@@ -107,11 +107,7 @@ class MujocoBody:
         return not any(wheel.rate for wheel in self.wheels)
 
     def advance(self, now: float) -> None:
-        """Let the time go by.
-
-        Args:
-            now: the time [s], never less than before.
-        """
+        """Let the time go by until `now` [s], never less than before."""
         self._now = now
         while self._origin + (self._n_steps + 1) * self._timestep <= now:
             self._step()

@@ -10,10 +10,7 @@ class LosablePort:
     """A port that is closed as soon as it is lost; see `interfaces.Port`."""
 
     def __init__(self, open_port: Callable[[], Port]) -> None:
-        """Open it.
-
-        Args:
-            open_port: opens it, each time anew.
+        """Open it by `open_port`, each time anew.
 
         Raises:
             UserError: if that is not possible.
