@@ -91,9 +91,6 @@ class ExperimentConfig(BaseModel):
     )
     network: NetworkName = Field(
         FEEDFORWARD,
-        N_TEST,
-        N_VALIDATION,
-        STARTS_MAX,
         description="feedforward, the paper's with hidden neurons and biases as below; "
         "or my.py:Class, a network of your own",
     )
