@@ -1,9 +1,13 @@
 """The shipped physics steps are fine enough, and the plane stands for the floor."""
 
+from dataclasses import replace
+
 import pytest
 
+from benchmarks import convergence
 from benchmarks.convergence import (
     REFINEMENT,
+    TASK,
     TOLERANCE,
     Configuration,
     controllers,
@@ -14,14 +18,25 @@ from benchmarks.convergence import (
 from epuck_mj.scene.model import load_scene
 from epuck_mj.step.control import BatchPolicy
 
-N_STARTS = 40
-"""A fifth of the benchmark's; it takes one changed outcome to move a mean by 2.5 %."""
+N_STARTS = 20
+"""A tenth of the benchmark's: an outcome that changes moves a mean by up to 5 %."""
+
+STEPS = 100
+"""A third of the benchmark's: a coarse step ruins a controller at the first wall."""
 
 CHOSEN = ("by hand", "de-best-seed-1", "fragile")
 """The slowest to notice a coarse step, one that evolved, and the quickest."""
 
 KEPT = 0.95
 """Share of its planar fitness that a controller keeps on wheels."""
+
+
+@pytest.fixture(autouse=True, scope="module")
+def short_trials():
+    """Trials of `STEPS`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(convergence, "TASK", replace(TASK, steps=STEPS))
+        yield
 
 
 def chosen() -> dict[str, BatchPolicy]:
