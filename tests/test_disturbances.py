@@ -238,7 +238,7 @@ def test_fitness_is_judged_by_the_truth(scene):
 
 
 CONFIG = ExperimentConfig.from_yaml(
-    "{noise: calibrated, randomise: true, evaluations: 36, steps: 25, trials: 2, "
+    "{noise: calibrated, randomise: true, evaluations: 60, steps: 25, trials: 2, "
     "optimizer: {algorithm: differential_evolution, strategy: best, "
     "population: 12, scale: 0.8, crossover: 0.9}}",
     "test",
