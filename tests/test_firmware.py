@@ -28,7 +28,7 @@ from epuck_mj.bridge.language.replies import (
 from epuck_mj.constants import BYTE_TIME, CALIBRATION_SAMPLES, PROXIMITY_PERIOD
 from tests.test_protocol import pieces
 
-quick = settings(deadline=None, max_examples=60)
+quick = settings(deadline=None, max_examples=40)
 
 COUNTS = (3000, 700, 90, 20, 15, 16, 0, 4095)
 LIGHT = (4000, 3999, 3998, 3997, 3996, 3995, 3994, 3993)
@@ -475,7 +475,7 @@ def test_requests_that_change_something(build):
     after=st.binary(max_size=40),
     case=asked,
 )
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=120)
 def test_garbage_on_the_way_to_the_host(build, before, after, case):
     request, reply = case
     robot = standing(build)
@@ -505,7 +505,7 @@ junk = st.lists(
 
 
 @given(build=st.sampled_from(list(BUILDS)), heard=junk)
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=80)
 def test_resync_after_anything_the_robot_heard(build, heard):
     robot = standing(build)
     robot.hear(heard)
@@ -520,7 +520,7 @@ def test_resync_after_anything_the_robot_heard(build, heard):
 
 
 @given(build=st.sampled_from(V1), case=asked, cut=st.integers(0, 60))
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=120)
 def test_a_reset_in_the_middle_of_a_reply(build, case, cut):
     request, reply = case
     robot = standing(build)

@@ -24,7 +24,7 @@ from epuck_mj.bridge.language.replies import (
 )
 from epuck_mj.errors import UserError
 
-quick = settings(deadline=None, max_examples=200)
+quick = settings(deadline=None, max_examples=100)
 
 COUNTS = (0, 1, 15, 16, 255, 256, 4094, 4095)
 COUNTS_BINARY = bytes.fromhex("0000 0100 0f00 1000 ff00 0001 fe0f ff0f")
@@ -173,7 +173,7 @@ likely = st.lists(
 
 
 @given(data=likely, request_=st.sampled_from(REQUESTS), cuts=cuts)
-@settings(deadline=None, max_examples=1500)
+@settings(deadline=None, max_examples=700)
 def test_anything_parses_asks_for_more_or_raises(data, request_, cuts):
     whole, cut = (outcome(request_, chunks) for chunks in ([data], pieces(data, cuts)))
     kinds = type(reply_of(request_)), BridgeError, type(None)
