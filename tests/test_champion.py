@@ -298,8 +298,8 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
     test = judges_of(config)["epuck"].test(stored.controller, 30, met)
     assert found["epuck"] == test
     assert test.mean != scores.held_out["epuck"].mean
-    _, disturbed, _ = scores.in_lines(60).splitlines()
-    assert disturbed.startswith("The same with the disturbances it evolved with: ")
+    _, _, disturbed, *_ = scores.in_lines(60.0).splitlines()
+    assert disturbed.startswith("With the disturbances it evolved with: ")
     # and shown so: the recorded trial is the first of that test
     judge, shown = judges_of(config)["epuck"], Trajectory.load(directory.trajectory)
     start, policy = judge.starts(1)[0], stored.controller
@@ -314,19 +314,21 @@ def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
     _, directory = written
     stored = load_controller(directory.champion).scores
     scores = Scores.read(stored, directory.champion)
-    fresh, believed = scores.in_lines(20).splitlines()
-    parts = []
-    for robot in ("epuck_planar", "epuck"):
-        test = stored["held_out"][robot]
-        mean, crashes = test["mean"], test["crash_rate"]
-        parts.append(f"{robot} {mean:.1f} ({crashes:.0%} crash)")
-    assert fresh == (
-        "Held-out fitness of 20, mean of 30 fresh starts: " + ", ".join(parts)
+    headline, plane, own, highest = scores.in_lines(20.0).splitlines()
+    tests = stored["held_out"]
+    mean, crashes = tests["epuck"]["mean"], tests["epuck"]["crash_rate"]
+    assert headline == (
+        f"The champion earns {mean:.1f} of 20: the mean of 30 fresh starts on epuck, "
+        f"{crashes:.0%} of them end in a crash"
     )
-    stored_fitness = stored["stored"]
-    assert believed == (
-        f"Stored fitness of 20, what evolution believes: {stored_fitness:.1f}"
-    )
+    mean, crashes = (tests["epuck_planar"][key] for key in ("mean", "crash_rate"))
+    assert plane == f"On epuck_planar {mean:.1f} ({crashes:.0%} crash)"
+    assert own.startswith(f"Evolution stored {stored['stored']:.1f} for it, from the")
+    believed = stored["most_believed"]
+    assert f"stored, {believed['stored']:.1f}, is what an" in highest
+    assert highest.endswith(f"fresh ones give it {believed['held_out']:.1f}")
+    # of an unknown maximum nothing is said
+    assert " of 20" not in scores.in_lines(None)
 
 
 def test_a_run_on_the_wheeled_robot_is_tested_on_the_plane_as_well(
@@ -341,7 +343,7 @@ def test_a_run_on_the_wheeled_robot_is_tested_on_the_plane_as_well(
     assert list(scores.held_out) == ["epuck", "epuck_planar"]
     written = load_controller(directory.champion)
     assert directory.champion.read_text(encoding="utf-8") == written.to_json()
-    assert len(scores.in_lines(10).splitlines()) == 2
+    assert len(scores.in_lines(10.0).splitlines()) == 4
 
 
 def test_a_champion_survives_the_checkpoint(finished, tmp_path):

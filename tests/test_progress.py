@@ -8,10 +8,11 @@ import struct
 import subprocess
 import sys
 import termios
+import time
 from pathlib import Path
 
 from evolution.run.generation_loop import Record
-from evolution.run.progress import LINES, Progress
+from evolution.run.progress import LINES, TICK, Progress
 
 ROOT = Path(__file__).resolve().parent.parent
 BUDGET = 4000
@@ -25,6 +26,15 @@ def show() -> None:
     with Progress(BUDGET, 0) as progress:
         for record in records():
             progress.update(record)
+
+
+def wait_for_something() -> None:
+    """Nothing happens for a second, then a stage begins."""
+    with Progress(BUDGET, 0) as progress:
+        time.sleep(2.5 * TICK)
+        progress.stage("Choosing the champion", 0, 3)
+        time.sleep(2.5 * TICK)
+        progress.stage("Testing it", 1, 3)
 
 
 def shown_on_a_terminal(code: str) -> str:
@@ -54,6 +64,18 @@ def test_a_terminal_gets_a_bar():
     last = shown.replace("\r", "\n").strip().splitlines()[-1]
     for figure in ("100%", "4000/4000", "eval/s", "gen=39", "best=78.0", "crash=25%"):
         assert figure in last
+
+
+def test_the_clock_goes_on_while_nothing_happens():
+    shown = shown_on_a_terminal(
+        "from tests import test_progress as t; t.wait_for_something()"
+    )
+    evolving, _, choosing = shown.partition("Choosing the champion")
+    # the first drawing, and two of the clock at least
+    assert evolving.count("0/4000") >= 3
+    assert choosing.count("Choosing the champion:") >= 1
+    assert "Testing it:  33%" in choosing
+    assert "1/3" in choosing
 
 
 def test_elsewhere_a_few_lines_are_enough(capsys):

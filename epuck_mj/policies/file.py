@@ -55,11 +55,11 @@ class Origin:
             raise ValueError(
                 f"expected a start_clearance in (0, 1] m, got {clearance!r}"
             )
-        hashes = [fields.get(key, {}) for key in ("mjcf_sha256", "own_sha256")]
-        for each in hashes:
-            if not isinstance(each, dict):
-                raise ValueError(f"expected an object of SHA-256, got {each!r}")
-        return cls(fields["robot"], fields["arena"], clearance, *hashes)
+        hashes = {key: fields.get(key, {}) for key in ("mjcf_sha256", "own_sha256")}
+        for key, value in hashes.items():
+            if not isinstance(value, dict):
+                raise ValueError(f"expected an object as {key}, got {value!r}")
+        return cls(fields["robot"], fields["arena"], clearance, **hashes)
 
 
 @dataclass(frozen=True)

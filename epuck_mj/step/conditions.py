@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from epuck_mj.errors import UserError
+from epuck_mj.host.command_line import word
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.disturbances import (
     BOOK,
@@ -81,7 +82,7 @@ class ConditionFlags:
 
     noise: NoiseLevel | Literal["default"] = "default"
     randomise: bool = False
-    calibration: Path | None = None
+    calibration: Annotated[Path | None, word("FILE")] = None
 
     @property
     def conditions(self) -> Conditions | None:

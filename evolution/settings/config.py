@@ -1,7 +1,7 @@
 """What an experiment is: typed, frozen, read from YAML, unknown keys refused."""
 
 from functools import cache
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 from pydantic import (
     BaseModel,
@@ -17,6 +17,7 @@ from pydantic import (
 
 from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
 from epuck_mj.errors import UserError
+from epuck_mj.host.command_line import word
 from epuck_mj.host.own_parts import is_own, located, own_part
 from epuck_mj.host.yaml_and_json import parse_yaml, to_yaml
 from epuck_mj.policies.network import Network
@@ -49,10 +50,12 @@ class ExperimentConfig(BaseModel):
     evaluations: StrictInt = Field(
         30_000, ge=1, description="budget: individuals evaluated, whole generations"
     )
-    robot: str = Field(
+    robot: Annotated[str, word("ROBOT")] = Field(
         "epuck_planar", description="epuck_planar, epuck (wheels) or an MJCF file"
     )
-    arena: str = Field("arena", description="name of a shipped arena or an MJCF file")
+    arena: Annotated[str, word("ARENA")] = Field(
+        "arena", description="name of a shipped arena or an MJCF file"
+    )
     trials: StrictInt = Field(5, ge=1, description="trials of an individual")
     steps: StrictInt = Field(
         300, ge=1, le=STEPS_MAX, description="control steps of a trial"

@@ -7,6 +7,7 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from tyro.constructors import PrimitiveConstructorSpec
 
 from epuck_mj.errors import UserError
+from epuck_mj.host.command_line import word
 from epuck_mj.host.own_parts import is_own
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.fitness import FORMULAS
@@ -35,9 +36,9 @@ def _one_of(*shipped: str) -> AfterValidator:
     return AfterValidator(known)
 
 
-FitnessName = Annotated[str, _one_of(*FORMULAS)]
+FitnessName = Annotated[str, _one_of(*FORMULAS), word("FITNESS")]
 
-NetworkName = Annotated[str, _one_of(FEEDFORWARD)]
+NetworkName = Annotated[str, _one_of(FEEDFORWARD), word("NETWORK")]
 
 
 def _of_known_algorithm(value: Any) -> Any:
@@ -93,7 +94,7 @@ CalibrationConfig = Annotated[
     # a flag takes the file only
     PrimitiveConstructorSpec(
         nargs=1,
-        metavar="PATH",
+        metavar="FILE",
         instance_from_str=lambda words: _calibration_flag(words[0]),
         is_instance=lambda value: value is None or isinstance(value, Calibration),
         str_from_instance=lambda value: ["none" if value is None else "as stored"],
