@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from epuck_mj.policies.wall_follower import YARDSTICK
 from evolution.pages.blocks import (
     Block,
@@ -121,6 +123,24 @@ def runs_table(study: StudyData) -> Table:
         means = [f"{study.yardstick[robot].mean:.1f}" for robot in robots]
         rows.append([f"{YARDSTICK}, written by hand", "", "", *means, ""])
     return Table([*columns, "best stored"], rows)
+
+
+def medians_table(study: StudyData, robot: str) -> Table:
+    """Medians over the runs of every experiment with runs, for a reader in a hurry."""
+    rows = [
+        [
+            label(name),
+            str(len(runs)),
+            f"{np.median(study.held_out(name, robot)):.0f}",
+            f"{np.median(study.best_stored(name)):.0f}",
+        ]
+        for name, runs in study.with_runs.items()
+    ]
+    if study.yardstick:
+        mean = study.yardstick[robot].mean
+        rows.append([f"{YARDSTICK}, written by hand", "", f"{mean:.0f}", ""])
+    columns = ["algorithm", "runs", "fitness on new starts", "best training fitness"]
+    return Table(columns, rows)
 
 
 def _there(study: StudyData) -> list[Block]:
