@@ -33,12 +33,12 @@ MODULE = "evolution.verify"
 
 @dataclass(frozen=True)
 class Options:
-    """Score the champions of finished runs again and compare with what is written.
+    """Test the champions of finished runs again and compare with their stored scores.
 
-    Exit status 1 if one differs.
+    The exit status is 1 if a score differs.
 
     Attributes:
-        paths: run directories, or study directories for all their runs.
+        paths: run directories, or study directories to verify all their runs.
         threads: threads that step the robots; 0 is one per core. Changes no result.
     """
 

@@ -407,7 +407,7 @@ def test_nobody_or_a_stranger_at_the_address(tmp_path, monkeypatch):
 )
 def test_what_is_no_address_is_refused_before_anything_is_written(address, tmp_path):
     output = tmp_path / "study"
-    with pytest.raises(UserError, match="expected as cluster tcp://host:8786") as info:
+    with pytest.raises(UserError, match="expected --cluster tcp://host:8786") as info:
         study(["quick", "--cluster", address, "--output", str(output)])
     assert str(info.value).endswith(f"got '{address}'")
     assert not output.exists()

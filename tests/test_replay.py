@@ -339,7 +339,7 @@ def test_a_viewer_opens_where_there_is_a_display(champion, here, monkeypatch, ca
     assert replay([champion]) == 0
     path = here / "run" / "replay.rrd"
     assert opened == [path]
-    assert capsys.readouterr().out.splitlines()[-1] == f"{path}, in the viewer"
+    assert capsys.readouterr().out.splitlines()[-1] == f"{path}, shown in the viewer"
     # not for those who want a file
     shown(champion)
     assert opened == [path]

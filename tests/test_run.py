@@ -493,7 +493,10 @@ def test_a_bad_experiment_file_is_refused(content, words, refusal, here):
         (["ga", "--populaton", "3"], ("--populaton",)),
         (["ga", "--strategy", "best"], ("--strategy",)),
         (["ga", "de-best"], ("de-best",)),
-        (["--seed", "3", "ga"], ("experiment comes first", "evolution.run ga")),
+        (
+            ["--seed", "3", "ga"],
+            ("the experiment as the first argument", "evolution.run ga"),
+        ),
         (["ga", "--seed", "x"], ("--seed", "'x'")),
         (["ga", "--seed", "-1"], ("seed", "-1")),
         (["ga", "--seed"], ("--seed",)),

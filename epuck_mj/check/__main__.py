@@ -16,21 +16,21 @@ from epuck_mj.scene.model_files import SHIPPED_ROBOTS
 
 @dataclass(frozen=True)
 class Options:
-    """Check an arena: walls, room, sensors, contacts, speed.
+    """Check an arena: walls, free space, sensors, contacts and speed.
 
-    Exit status 1 if it cannot be used.
+    The exit status is 1 if the arena cannot be used.
     """
 
     arena: tyro.conf.Positional[str]
-    """name of a shipped arena, or path of an MJCF"""
+    """name of a shipped arena, or path of an MJCF file"""
     robot: str | None = None
-    """name of a shipped robot, or path of an MJCF; both shipped ones by default"""
+    """name of a shipped robot, or path of an MJCF file; both shipped ones by default"""
     picture: Path | None = None
-    """PNG to write: the walls from above, and where robots may start"""
+    """PNG file to draw the walls and the free space to, seen from above"""
 
 
 def check(argv: Sequence[str]) -> int:
-    """Check and print; the exit status.
+    """Check an arena and print the findings; the exit status.
 
     Raises:
         UserError: if there is no arena to look at, or no place for the picture.

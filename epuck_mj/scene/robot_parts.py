@@ -52,7 +52,7 @@ def check_floor(model: mujoco.MjModel, arena: Path) -> None:
         raise UserError(
             f"arena '{arena}': the robot's shell would hit the plane "
             f"'{model.geom(geom).name or geom}'; expected a floor with "
-            'contype="2" conaffinity="2", which wheels meet and shells do not'
+            'contype="2" conaffinity="2", which wheels touch and shells do not'
         )
     base = model.body_jntadr[model.body(ROBOT_BODY).id]
     if model.jnt_type[base] != _JOINT.mjJNT_FREE:

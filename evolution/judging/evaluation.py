@@ -176,7 +176,7 @@ class DmControlEngine:
             ValueError: if there are disturbances.
         """
         if work.disturbances is not None:
-            raise ValueError("expected no disturbances: dm_control has ideal robots")
+            raise ValueError("expected no disturbances with engine dm_control")
         # dm_control for those who use it
         from epuck_mj.environments.dm_control import FollowWalls, environment
 

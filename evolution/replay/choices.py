@@ -120,8 +120,8 @@ def starts_for(
         raise UserError("expected one of --trials, --starts and --pose, got several")
     if not policies and (any(ways) or options.generations is not None):
         raise UserError(
-            "expected a policy for --trials, --starts, --pose or --generations: a "
-            "recorded trajectory is what it is"
+            "expected a policy with --trials, --starts, --pose or --generations, got a "
+            "recorded trajectory"
         )
     if options.pose:
         if len(options.pose) != 3 or not np.isfinite(options.pose).all():

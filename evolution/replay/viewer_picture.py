@@ -34,12 +34,12 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True)
 class ViewerPictureOptions:
-    """Draw what the rerun viewer shows of a recording, without a window.
+    """Write a picture of a recording in the rerun viewer, without opening a window.
 
     Attributes:
-        recording: of trials (.rrd).
+        recording: recording of trials (.rrd).
         output: picture to write (PNG).
-        time: of the trial that is shown [s].
+        time: time of the trial that is shown [s].
         size: width and height of the viewer [pixels].
     """
 

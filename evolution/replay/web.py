@@ -88,5 +88,5 @@ def _fetched(address: str, until: float) -> bytes:
                 return response.read()
         except OSError as error:
             if time.monotonic() > until:
-                raise UserError(f"rerun did not hand out its viewer: {error}") from None
+                raise UserError(f"cannot read rerun's viewer: {error}") from None
             time.sleep(0.05)

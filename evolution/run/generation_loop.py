@@ -223,8 +223,8 @@ def make_engine(
     if name == "dm_control":
         if config.noise != "none":
             raise UserError(
-                f"engine dm_control knows ideal robots only, got noise {config.noise}: "
-                "expected engine batch"
+                f"engine dm_control supports ideal robots only, got noise "
+                f"{config.noise}; expected engine batch"
             )
         return DmControlEngine(scene, config.task)
     raise UserError(f"unknown engine '{name}'; available: {', '.join(ENGINES)}")

@@ -121,7 +121,7 @@ def _show(config: ExperimentConfig, port: int, generations: Any) -> None:
     try:
         _follow(config, port, generations)
     except ConnectionError:
-        print("The viewer has gone; the run goes on", file=sys.stderr)
+        print("The viewer was closed; the run continues", file=sys.stderr)
     except Exception:
         traceback.print_exc()
     # rerun would wait for a viewer that has gone

@@ -54,14 +54,14 @@ def made_finite(fitness: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class CmaEsParameters:
-    """What a CMA-ES is made of.
+    """Parameters of a CMA-ES.
 
     Attributes:
         population: individuals of a generation (lambda), at least 4; doubled by each
             restart. The tutorial's default for 40 genes is 15.
         sigma: first step size of each start, above 0, at most the width of the bounds.
-        restarts: start again when there is no more progress; otherwise go on.
-        algorithm: what it is, for configurations.
+        restarts: start again when there is no more progress; otherwise continue.
+        algorithm: the algorithm's name in configurations.
 
     Raises:
         ValueError: a value out of its range.

@@ -50,14 +50,14 @@ def one_fifth_rule(
 
 @dataclass(frozen=True)
 class EvolutionStrategyParameters:
-    """What (1+1) evolution strategies are made of.
+    """Parameters of (1+1) evolution strategies.
 
     Attributes:
         lineages: number of strategies side by side, at least 1: the population.
         sigma: first step size of each, above 0, at most the width of the bounds.
-        bounds_rule: midpoint, none, clip, reflect or reinit: where a gene outside the
-            bounds goes.
-        algorithm: what it is, for configurations.
+        bounds_rule: how a gene outside the bounds is moved: midpoint, none, clip,
+            reflect or reinit.
+        algorithm: the algorithm's name in configurations.
 
     Raises:
         ValueError: a value out of its range or an unknown name.

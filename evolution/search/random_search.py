@@ -28,11 +28,11 @@ def best_of(fitness: np.ndarray, n: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class RandomSearchParameters:
-    """What a random search is made of.
+    """Parameters of a random search.
 
     Attributes:
         population: genomes of a generation, and individuals kept, at least 1.
-        algorithm: what it is, for configurations.
+        algorithm: the algorithm's name in configurations.
 
     Raises:
         ValueError: a value out of its range.

@@ -81,7 +81,7 @@ def save_recording(
         content = file.read_bytes() if file.exists() else b""
     # rerun only warns when it is switched off
     if not content:
-        raise UserError(f"cannot write '{path}': rerun is off, see RERUN")
+        raise UserError(f"cannot write '{path}': the variable RERUN switches rerun off")
     with writing():
         write_bytes(Path(path), content)
 

@@ -70,7 +70,7 @@ def check_address(address: str) -> None:
     """
     if not REMOTE.fullmatch(address) and not LOCAL.fullmatch(address):
         raise UserError(
-            "expected as cluster tcp://host:8786, tls://host:8786 or, for workers on "
+            "expected --cluster tcp://host:8786, tls://host:8786 or, for workers on "
             f"this machine, local:4, got '{address}'"
         )
 
