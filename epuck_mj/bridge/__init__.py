@@ -1,4 +1,4 @@
-"""The bridge to a real e-puck: the policy that was evolved here drives it there.
+"""The bridge to a real e-puck, which an evolved policy drives.
 
 - `language`: bytes only, no port, no clock: requests and what their replies mean.
 - `line`: ports and connections: the cable or WiFi, and who stops a lost robot.

@@ -1,4 +1,4 @@
-"""A robot is calibrated: `python -m epuck_mj.calibrate --port PORT`."""
+"""Calibrate a robot: `python -m epuck_mj.calibrate --port PORT`."""
 
 import sys
 import time
@@ -63,7 +63,7 @@ def calibrate_robot(
     clock: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> int:
-    """Calibrate, writing the file after each step; the exit status, as the bridge's.
+    """Calibrate and write the file after each step; the exit status, as the bridge's.
 
     Args:
         steps: names of STEPS.

@@ -1,4 +1,4 @@
-"""`python -m epuck_mj.check ARENA`: what is there, and what is wrong.
+"""Check an arena: `python -m epuck_mj.check ARENA`.
 
 Exit status 0 if the arena is usable, 1 if errors were found in it, and 2, as for all
 command lines here, if there is no arena to look at: bad options, no file, no text.

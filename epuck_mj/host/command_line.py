@@ -1,4 +1,4 @@
-"""What all command lines share: one clear line and exit status 2 for bad input."""
+"""Command lines: parsing, and one clear line with exit status 2 for bad input."""
 
 import contextlib
 import io
@@ -23,7 +23,7 @@ def parse(
     argv: Sequence[str],
     default: Options | None = None,
 ) -> Options:
-    """The options in `argv`; the fields of `kind` are the flags.
+    """Parse `argv` into options whose flags are the fields of `kind`.
 
     Args:
         kind: dataclass of the options.
@@ -56,7 +56,7 @@ def parse(
 
 
 def _unboxed(text: str) -> str:
-    """The message of tyro's box of several lines, on one and without its extras."""
+    """Text of tyro's box of several lines on one line, without its extras."""
     drawn = "│" in text
     lines = [
         line.strip("│ ") for line in text.splitlines() if line[:1] not in ("╭", "╰")
@@ -80,7 +80,7 @@ EXTRAS = (
     (r" ?\[type=\w+, input_value=(.*?), input_type=\w+\]", r", got \1"),
     (r" ?For further information visit \S+", ""),
 )
-"""What pydantic adds for programmers, and what stands for it."""
+"""Texts that pydantic adds for programmers, and their replacements."""
 
 
 def main(run: Callable[[Sequence[str]], int]) -> None:
@@ -100,7 +100,7 @@ def main(run: Callable[[Sequence[str]], int]) -> None:
 
 
 def shell_command(module: str, *arguments: str | Path) -> str:
-    """The line that runs a module of ours, as a person would type it here."""
+    """The shell command that runs a module, as one would type it here."""
     python = Path(sys.executable)
     if python.is_relative_to(Path.cwd()):
         python = python.relative_to(Path.cwd())
@@ -110,7 +110,7 @@ def shell_command(module: str, *arguments: str | Path) -> str:
 
 
 def check_threads(threads: int) -> None:
-    """Nothing, if so many threads make sense; 0 stands for one per core.
+    """Refuse negative or too large numbers of threads; 0 stands for one per core.
 
     Raises:
         UserError: if not.

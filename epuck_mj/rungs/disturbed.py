@@ -17,7 +17,7 @@ from epuck_mj.step.sensors import Reading, counted, sensed_distance
 def disturbed(
     robots: Simulator, disturbances: Disturbances | None, control_step: float
 ) -> Robots:
-    """Robots with disturbances around them, or as they are if there are none.
+    """Robots with these disturbances, or the robots unchanged if there are none.
 
     Args:
         robots: that drive.
@@ -32,7 +32,7 @@ def disturbed(
 
 
 class DisturbedRobots:
-    """Robots in disturbances; stepped like those inside."""
+    """Robots whose commands and readings are disturbed."""
 
     def __init__(
         self,
@@ -97,7 +97,7 @@ class DisturbedRobots:
         return self._robots.clearances()
 
     def _sensed(self, reading: Reading) -> Reading:
-        """What the robots make of it; the truth goes along."""
+        """The disturbed reading, with the true distances."""
         given, of = self._disturbances, self._of
         truth, before = reading.distance, self._before
         self._before = truth

@@ -1,4 +1,4 @@
-"""When control steps end: every so often, by a clock that never goes back."""
+"""Schedule of control steps, by a monotonic clock."""
 
 import time
 from collections.abc import Callable
@@ -38,7 +38,7 @@ class Schedule:
         self._tick = self._clock() + self._period
 
     def wait(self) -> None:
-        """Let the time go by until the next tick."""
+        """Wait until the next tick."""
         left = self._tick - self._clock()
         if left < 0:
             self.n_overruns += 1

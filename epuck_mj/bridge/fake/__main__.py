@@ -19,7 +19,7 @@ from epuck_mj.host.interruption import Interrupted, Interruption
 MODULE = "epuck_mj.bridge.fake"
 RANDOM = "random"
 RANDOM_END = 10.0
-"""No fault of a random scenario starts later than this [s]."""
+"""Latest start of a fault in a random scenario [s]."""
 
 
 @dataclass(frozen=True)

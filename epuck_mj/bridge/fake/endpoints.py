@@ -1,4 +1,4 @@
-"""Where a host finds an emulated robot: a pseudo-terminal or a TCP port, in real time.
+"""Endpoints of an emulated robot: a pseudo-terminal or a TCP port, in real time.
 
 Both serve one host at a time, on this computer only, and vanish and return with the
 scenario.
@@ -19,14 +19,14 @@ from epuck_mj.errors import UserError
 LOCALHOST = "127.0.0.1"
 
 IDLE_TIME, BUSY_TIME = 0.004, 0.0005
-"""How long it sleeps when nothing, or something, is under way [s]."""
+"""Sleep between exchanges when no bytes, or some, are under way [s]."""
 
 HEARD_MAX = 4096
-"""Most bytes heard at once."""
+"""Largest number of bytes received at once."""
 
 
 class Endpoint(Protocol):
-    """Where bytes come in and go out.
+    """An endpoint that receives and sends bytes.
 
     Attributes:
         is_open: whether a host can open it.
@@ -48,15 +48,15 @@ class Endpoint(Protocol):
         ...
 
     def handles(self) -> list[int]:
-        """File descriptors on which something may come."""
+        """File descriptors that bytes may arrive on."""
         ...
 
     def receive(self) -> bytes:
-        """What came; does not wait."""
+        """The bytes that have arrived; does not wait."""
         ...
 
     def send(self, data: bytes) -> None:
-        """Give the host what it takes; the rest is lost, as is all if it is away."""
+        """Send what the host accepts; the rest is lost, all if it is not connected."""
         ...
 
 
@@ -224,7 +224,7 @@ def serve(
     clock: Callable[[], float],
     wanted: Callable[[], bool],
 ) -> None:
-    """Let a robot live behind an endpoint, which is closed in the end.
+    """Run a robot behind an endpoint, and close the endpoint in the end.
 
     Args:
         emulator: the robot.

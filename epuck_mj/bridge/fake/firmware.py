@@ -1,4 +1,4 @@
-"""An emulated e-puck that listens to a serial line: v1 with either firmware, or v2.
+"""An emulated e-puck on a serial line: v1 with either firmware, or v2.
 
 It does what the real ones do, quirks included:
 
@@ -37,18 +37,18 @@ from epuck_mj.constants import BATTERY_LOW, N_LEDS, RECEIVE_RING
 _RING = range(N_LEDS)
 
 BINARY_OPERANDS = {"D": 4, "L": 2, "P": 4}
-"""Operand bytes of the binary commands that have any."""
+"""Number of operand bytes of the binary commands with operands."""
 
 
 class Firmware(Talker):
-    """A robot's firmware, from its power switch on.
+    """A robot's firmware, from the moment it is switched on.
 
     Attributes:
         leds: of the ring, then the body's and the front one: 0 is off, 1 on.
     """
 
     def __init__(self, body: Body, build: Build, now: float) -> None:
-        """Switch it on: there is a banner to be read.
+        """Switch the robot on, which sends its banner.
 
         Args:
             body: what it moves and senses with.
@@ -60,7 +60,7 @@ class Firmware(Talker):
         self.reset(now)
 
     def reset(self, now: float) -> None:
-        """Press its reset button.
+        """Press the robot's reset button.
 
         Args:
             now: the time [s], never less than before.
@@ -151,7 +151,7 @@ class Firmware(Talker):
         return b""
 
     def _ascii(self, line: bytes) -> None:
-        """Carry out a line."""
+        """Carry out a line in ASCII."""
         letter = chr(line[0])
         if letter == "b" and self._build.tells_battery:
             self._say("b", [int(self._body.battery() >= BATTERY_LOW)])

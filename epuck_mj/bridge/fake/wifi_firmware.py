@@ -31,14 +31,14 @@ from epuck_mj.constants import (
 )
 
 TIMER = MotorTimer(STEP_RATE_MAX, MOTOR_TICK_RATE_2, saves_current=False)
-"""Motors behind a radio that accepts less than the main processor does."""
+"""Timing of motors behind a radio that accepts lower speeds only."""
 
 
 class WifiFirmware(Talker):
-    """An e-puck2's radio and main processor, from the power switch on."""
+    """An e-puck2's radio and main processor, from the moment it is switched on."""
 
     def __init__(self, body: Body, now: float) -> None:
-        """Switch it on.
+        """Switch the robot on.
 
         Args:
             body: what it moves and senses with.

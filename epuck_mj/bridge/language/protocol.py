@@ -1,4 +1,4 @@
-"""The robot's language, complete: what a link needs to know. Bytes only, no I/O.
+"""The robot's language as a link needs it: bytes only, no I/O.
 
 A link does this, and this only:
 
@@ -35,7 +35,7 @@ from epuck_mj.constants import OPERANDS_MAX, RESYNC_QUIET
 
 @dataclass(frozen=True)
 class Resync:
-    """How host and robot find each other again.
+    """Recipe by which host and robot synchronise again.
 
     Send `flush`; drop what comes until nothing came for `quiet` seconds; ask `barrier`.
     If its reply does not come, or not alone, do it again: what was left in the robot
@@ -58,7 +58,7 @@ RESYNC = Resync(
     quiet=RESYNC_QUIET,
     barrier=ascii.version_query(),
 )
-"""The recipe for a serial line.
+"""Recipe by which host and robot synchronise on a serial line.
 
 Zeros are ignored between commands. The single return is followed by ASCII only: a
 binary command right after it would be taken for a line. Whatever the zeros completed
@@ -69,5 +69,5 @@ Source: gctronic/e-puck-library, `Asercom.c` (inferred from reading it, not trie
 
 
 def greets(data: bytes) -> bool:
-    """Whether the robot was reset while this came."""
+    """Whether these bytes hold the banner of a robot that was reset."""
     return BANNER in data

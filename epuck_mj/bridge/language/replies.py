@@ -1,4 +1,4 @@
-"""What an e-puck answers, whichever dialect it was asked in."""
+"""Replies of an e-puck, in every dialect."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from epuck_mj.constants import N_PROXIMITY, N_SELECTOR, PROXIMITY_COUNT_MAX
 
 @dataclass(frozen=True)
 class Acknowledged:
-    """The robot has done what it was told.
+    """Reply that the robot has carried out a command.
 
     Attributes:
         letter: of the command, in lower case.
@@ -19,7 +19,7 @@ class Acknowledged:
 
 @dataclass(frozen=True)
 class Version:
-    """Which firmware answers.
+    """Firmware version of the robot.
 
     Attributes:
         lines: the firmware's line and, if the robot has one, the hardware's.
@@ -30,7 +30,7 @@ class Version:
 
 @dataclass(frozen=True)
 class Battery:
-    """What the robot says of its battery.
+    """State of the robot's battery.
 
     Attributes:
         state: `1` if it is good and `0` if it is low; of some, a raw value and per
@@ -40,18 +40,18 @@ class Battery:
     state: str
 
     def __str__(self) -> str:
-        """The state in words for a person."""
+        """The battery's state in words."""
         return {"0": "low", "1": "good"}.get(self.state, self.state)
 
 
 @dataclass(frozen=True)
 class Calibrated:
-    """The proximity sensors read zero for what they see now."""
+    """Reply that the proximity sensors' zero is set."""
 
 
 @dataclass(frozen=True)
 class Restarted:
-    """The robot was reset as asked."""
+    """Reply that the robot was reset as asked."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Steps:
 
 @dataclass(frozen=True)
 class CommandedSpeeds:
-    """The speeds last commanded, as they came; nobody measures them.
+    """The speeds last commanded; they are not measured.
 
     Attributes:
         left: of the left motor [steps/s].
@@ -120,7 +120,7 @@ class CommandedSpeeds:
 
 @dataclass(frozen=True)
 class Cycle:
-    """What a control step needs to know of the robot.
+    """Counts and step counters of a control step.
 
     Attributes:
         proximity: the proximity counts.
@@ -133,7 +133,7 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Sensors:
-    """What the bridge reads of an e-puck2's sensor packet.
+    """Values of an e-puck2's sensor packet that the bridge uses.
 
     Attributes:
         proximity: the proximity counts.
@@ -148,7 +148,7 @@ class Sensors:
     selector: int
 
     def __post_init__(self) -> None:
-        """Refuse a selector with more positions than there are."""
+        """Refuse a selector position that does not exist."""
         if not 0 <= self.selector < N_SELECTOR:
             raise BridgeError(
                 f"a selector from 0 to {N_SELECTOR - 1}", f"{self.selector}"

@@ -1,4 +1,4 @@
-"""A robot on a serial line: an e-puck v1 over Bluetooth, an e-puck2 over either."""
+"""A robot on a serial line: e-puck v1 over Bluetooth, e-puck2 over Bluetooth or USB."""
 
 from epuck_mj.bridge.failures import BridgeError, LinkLost, RobotRestarted, StillMoving
 from epuck_mj.bridge.language import ascii, binary
@@ -16,7 +16,7 @@ class SerialLine:
     """
 
     def __init__(self, link: Link) -> None:
-        """Take a link that is open."""
+        """Use an open link."""
         self._link = link
         self._busy_until = 0.0
         self.n_repairs = 0
@@ -47,7 +47,7 @@ class SerialLine:
         return Greeting(", ".join(version.lines), battery)
 
     def cycle(self, left: int, right: int, changed: bool, until: float) -> Cycle:
-        """See Connection; while out of step, host and robot find each other again.
+        """See Connection; synchronises again if host and robot are out of step.
 
         Raises:
             BridgeError: if they did not; names what was wrong first.

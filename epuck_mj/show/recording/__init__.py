@@ -1,4 +1,4 @@
-"""Rerun recordings: trials to watch. Only this package imports rerun.
+"""Rerun recordings of trials. Only this package imports rerun.
 
 One .rrd, blueprint inside: the arena in 3D with every trial's robot, the path that
 grows and the eight proximity rays, beside plots of everything the trajectories hold.
@@ -101,7 +101,7 @@ def _log_trial(
 
 
 def _identity(trials: Sequence[Trial]) -> str:
-    """The same for the same trials, so that two files of them are one recording."""
+    """Identity of a recording, equal for equal trials."""
     digest = hashlib.sha256()
     for trial in trials:
         digest.update(trial.name.encode())
