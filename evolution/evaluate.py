@@ -111,7 +111,7 @@ def evaluate_policies(argv: Sequence[str]) -> int:
 
 
 def _described(test: HeldOut, steps: int) -> str:
-    """The outcome for a person, indented."""
+    """Indented lines with the scores of a policy."""
     low, high = test.interval
     metrics = test.metrics
     shares = sorted(test.behaviour.items(), key=lambda item: -item[1])

@@ -1,4 +1,4 @@
-"""The figure of the gap: how much is kept in how many worlds."""
+"""Figure of the gap: in how many worlds policies keep how much fitness."""
 
 from collections.abc import Mapping
 
@@ -14,13 +14,13 @@ from evolution.pages.words import robot_name
 DASHES = ("-", (0, (7, 2)), (0, (2, 1.5)), (0, (7, 1.5, 1.2, 1.5)))
 
 SHARE_END = 1.2
-"""End of the axis of shares; noise helps some."""
+"""End of the axis of shares, which may exceed 1."""
 
 
 def kept_figure(
     transfers: Mapping[str, Transfer], groups: Mapping[str, list[int]]
 ) -> Figure:
-    """A panel per robot, a line per group.
+    """Figure with a panel per robot and a line per group of policies.
 
     Args:
         transfers: by robot.

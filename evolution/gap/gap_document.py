@@ -1,4 +1,4 @@
-"""The document of the gap: a table per robot, and how ranks agree."""
+"""Document about the gap: a table per robot, and rank correlations."""
 
 from collections.abc import Mapping, Sequence
 
@@ -30,7 +30,7 @@ def gap_summary(
     groups: Mapping[str, Sequence[int]],
     peers: Mapping[str, Sequence[int]],
 ) -> Table:
-    """A row per experiment and robot: medians over its policies of their means.
+    """Table with a row per experiment and robot: medians of its policies' means.
 
     Args:
         transfers: by robot.
@@ -66,7 +66,7 @@ def by_latency(
     groups: Mapping[str, Sequence[int]],
     latency: np.ndarray,
 ) -> Table:
-    """Mean shares kept when commands are late: a row per experiment and robot.
+    """Table of mean shares kept by latency, with a row per experiment and robot.
 
     Args:
         transfers: by robot.
@@ -93,7 +93,7 @@ def gap_document(
     starts: int,
     latency: np.ndarray,
 ) -> list[Block]:
-    """The document: what was found, as blocks.
+    """Blocks of the document about the gap.
 
     Args:
         names: of the policies.
@@ -143,7 +143,7 @@ def gap_document(
 def _ranks(
     transfers: Mapping[str, Transfer], peers: Mapping[str, Sequence[int]]
 ) -> list[Block]:
-    """Rank correlations in words; no block if all policies are too few."""
+    """Rank correlations in words; no block if there are too few policies."""
     items = []
     for speed, members in peers.items():
         for robot, transfer in transfers.items():

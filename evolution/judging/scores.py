@@ -1,4 +1,4 @@
-"""Scores: what a champion is worth, as its file says it.
+"""Scores of champions, as in their files.
 
 Read with `read`, which refuses what is no score, and written with `to_dict`, which
 leaves out what is not known.
@@ -15,11 +15,11 @@ from epuck_mj.errors import UserError
 
 
 class _Record(BaseModel, frozen=True, allow_inf_nan=False):
-    """Values that are read from a file and written to one."""
+    """Record that is read from a file and written to one."""
 
     @classmethod
     def read(cls, fields: Mapping[str, Any], path: Path) -> Self:
-        """What the file at `path` says; keys that are unknown say nothing.
+        """Read the record from fields of the file at `path`; ignore unknown keys.
 
         Raises:
             UserError: naming the first value that is missing or no score.
@@ -32,12 +32,12 @@ class _Record(BaseModel, frozen=True, allow_inf_nan=False):
             raise UserError(f"'{path}' is damaged: {where}: {first['msg']}") from None
 
     def to_dict(self) -> dict[str, Any]:
-        """All that is known as plain values, in the order of the attributes."""
+        """The known values, in the order of the attributes."""
         return self.model_dump(exclude_unset=True)
 
 
 class HeldOut(_Record, frozen=True):
-    """A controller on `starts` fresh starts.
+    """Test of a controller on `starts` held-out starts.
 
     Older files know less: there, numbers are nan and mappings empty.
 
@@ -99,7 +99,7 @@ class Believed(_Record, frozen=True):
 
 
 class Scores(_Record, frozen=True):
-    """What a champion is worth.
+    """Scores of a champion.
 
     Attributes:
         stored: fitness that evolution believes in.
@@ -116,7 +116,7 @@ class Scores(_Record, frozen=True):
     held_out_as_evolved: Mapping[str, HeldOut] = {}
 
     def in_lines(self, steps: int) -> str:
-        """Held-out fitness on each robot and stored fitness, of `steps`, in lines."""
+        """Lines with held-out fitness on each robot and stored fitness, of `steps`."""
         starts = next(iter(self.held_out.values())).starts
         lines = [
             f"Held-out fitness of {steps}, mean of {starts} fresh starts: "
@@ -132,7 +132,7 @@ class Scores(_Record, frozen=True):
 
     @property
     def in_short(self) -> str:
-        """Held-out fitness on each robot and stored fitness, in part of a line."""
+        """Part of a line with held-out fitness on each robot and stored fitness."""
         return f"held-out {_in_words(self.held_out)}; stored {self.stored:.1f}"
 
 
@@ -144,14 +144,14 @@ def _in_words(tests: Mapping[str, HeldOut]) -> str:
 
 
 class KnownScores(Scores, frozen=True):
-    """Scores of any policy: all may be unknown, stored and held-out fitness as well."""
+    """Scores of any policy, of which each may be unknown."""
 
     stored: StrictFloat = math.nan
     held_out: Mapping[str, HeldOut] = {}
 
     @classmethod
     def found_in(cls, fields: Mapping[str, Any]) -> Self:
-        """Scores of a file that anybody may have made; what is none is left out."""
+        """Scores in a file by any program; invalid ones are left out."""
         sound = dict(fields)
         while True:
             try:

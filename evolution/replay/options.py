@@ -1,4 +1,4 @@
-"""What a person may ask of `python -m evolution.replay`."""
+"""Options of `python -m evolution.replay`."""
 
 from dataclasses import dataclass, field
 from pathlib import Path

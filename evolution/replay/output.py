@@ -1,4 +1,4 @@
-"""What a replay is shown as: a recording, a window, a page, a video or a picture."""
+"""Outputs of a replay: a recording, a window, a page, a video or a picture."""
 
 import sys
 import webbrowser

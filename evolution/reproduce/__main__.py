@@ -1,4 +1,4 @@
-"""The whole study by one command: `python -m evolution.reproduce [--quick | --full]`.
+"""The whole study in one command: `python -m evolution.reproduce [--quick | --full]`.
 
 Runs the study, reports it, and holds each of the paper's claims against it.
 """

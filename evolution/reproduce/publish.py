@@ -57,7 +57,7 @@ def publish(argv: Sequence[str]) -> int:
 
 
 def shipped(results: Path) -> list[Path]:
-    """The studies that are there."""
+    """Paths of the shipped studies."""
     return [results / name for name in REPORTED if (results / name).is_dir()]
 
 

@@ -1,4 +1,4 @@
-"""REPRODUCTION.md: the paper's claims, what stored fitness hides, what differs."""
+"""REPRODUCTION.md: the paper's claims, luck in stored fitness, differences."""
 
 from collections.abc import Sequence
 
@@ -104,7 +104,7 @@ def reproduction(
 
 
 def runs_table(study: StudyData) -> Table:
-    """Held-out fitness first, then best stored, of every experiment with runs."""
+    """Table of held-out and best stored fitness of every experiment with runs."""
     robots = shown_robots(study)
     columns = ["algorithm", "n", "evaluations"]
     columns += [f"held-out, {robot}" for robot in robots]
@@ -162,7 +162,7 @@ def _claims(found: Sequence[Claim]) -> Table:
 
 
 def _hidden(study: StudyData) -> list[Block]:
-    """What whoever trusts stored fitness would have taken home."""
+    """Blocks about the individuals with the highest stored fitness."""
     robot, rows = study.robots[0], []
     for name, runs in study.runs.items():
         stored, held_out = most_believed_fitness(study, name)
@@ -195,7 +195,7 @@ def _hidden(study: StudyData) -> list[Block]:
 
 
 def _rungs(study: StudyData) -> list[Block]:
-    """How much of the planar fitness champions keep on wheels."""
+    """Blocks about how much of their planar fitness champions keep on wheels."""
     if len(study.robots) < 2:
         return [Paragraph("Champions were tested on one robot only.")]
     first, last = study.robots[0], study.robots[-1]

@@ -114,7 +114,7 @@ class CmaEs(Optimizer):
         return self._cma.population_size
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
-        """Make the generation asked the current one; start again if it is time."""
+        """Make the generation asked the current one; restart if it is stuck."""
         # it minimises
         costs = (-made_finite(told)).tolist()
         self._cma.tell(list(zip(asked, costs, strict=True)))
@@ -161,7 +161,7 @@ class CmaEs(Optimizer):
         }
 
     def _should_stop(self) -> bool:
-        """Whether the present start has nothing left to find, or only noise."""
+        """Whether the present search makes no more progress, or only by noise."""
         window = stagnation_window(
             len(self._history), self._space.genes, self._cma.population_size
         )
@@ -170,7 +170,7 @@ class CmaEs(Optimizer):
         return self._cma.should_stop() or has_stagnated(recent, window)
 
     def _started(self, population: int) -> "CMA":
-        """A new search of that population at a random mean, without a history."""
+        """A new search with this population at a random mean."""
         # with scipy behind it: for those who use it
         from cmaes import CMA
 
@@ -192,7 +192,7 @@ class CmaEs(Optimizer):
 
 
 def stagnation_window(generations: int, genes: int, population: int) -> int:
-    """How many of its last generations a start is judged by: a fifth, at least 120.
+    """Number of last generations that are checked for progress: a fifth, at least 120.
 
     Args:
         generations: how many there were since the start.

@@ -26,10 +26,10 @@ from evolution.search.bounds import BOUNDS_RULES, check_bounds_rule
 from evolution.search.search_space import SearchSpace, refuse_wide_steps
 
 ALPHA = np.exp(1 / 3)
-"""What a success multiplies sigma with; four failures undo it."""
+"""Factor of sigma after a success, which four failures undo."""
 
 SIGMA_MIN = 1e-12
-"""Smallest sigma, as a share of the width of the bounds: the rule alone has none."""
+"""Smallest sigma, as a share of the width of the bounds."""
 
 
 def one_fifth_rule(

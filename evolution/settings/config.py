@@ -1,4 +1,4 @@
-"""What an experiment is: typed, frozen, read from YAML, unknown keys refused."""
+"""Configuration of an experiment: typed, frozen, read from YAML."""
 
 from functools import cache
 from typing import Any, Self
@@ -134,7 +134,7 @@ class ExperimentConfig(BaseModel):
 
     @model_validator(mode="after")
     def _of_robots_there_are(self) -> Self:
-        """Refuse conditions that exclude themselves."""
+        """Refuse conditions that exclude each other."""
         _ = self.conditions
         return self
 

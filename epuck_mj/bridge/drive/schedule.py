@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 
 class Schedule:
-    """Ticks at equal distances.
+    """Ticks at equal intervals.
 
     A step that is not done when its tick comes is an overrun: the next tick then comes
     a whole period after the late one, so no step is shorter than the others.

@@ -1,4 +1,4 @@
-"""The runs of a study on a Dask cluster: workers elsewhere, the files here.
+"""Runs of a study on a Dask cluster, with their files on this machine.
 
 Whatever happens on the way, the bytes are those of a run on this machine, if the
 processors are of one type: a task whose worker dies is done again by another, and a
@@ -29,7 +29,7 @@ __all__ = ["carry_out_on_cluster", "check_address"]
 def carry_out_on_cluster(
     jobs: Sequence[Job], address: str, split: bool, racing: bool
 ) -> Iterator[Event]:
-    """Do all jobs on a cluster; those under way are dropped with this generator.
+    """Do all jobs on a cluster; closing the generator drops unfinished jobs.
 
     Args:
         jobs: what to do.
