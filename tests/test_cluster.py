@@ -472,7 +472,7 @@ def test_ctrl_c_ends_workers_of_its_own(tmp_path):
         _, stderr = process.communicate(timeout=PATIENCE)
         assert process.returncode == 130
         assert len(stderr.splitlines()) == 1
-        assert stderr.startswith("Interrupted; go on with: ")
+        assert stderr.startswith("Interrupted; continue with: ")
 
         def nobody_left() -> bool:
             try:

@@ -663,7 +663,7 @@ def resume_command(stderr: str) -> list[str]:
     """The arguments that the last line tells a person to type."""
     line = stderr.splitlines()[-1]
     match = re.fullmatch(
-        r"Interrupted after ([\d,]+) evaluations; go on with: (.*)", line
+        r"Interrupted after ([\d,]+) evaluations; continue with: (.*)", line
     )
     assert match, stderr
     python, dash_m, module, *argv = shlex.split(match[2])

@@ -1,7 +1,7 @@
 """Drives and readings of a robot for its calibration, as safe as the bridge's.
 
-Each drive has the connection to itself: it opens it, sees that the robot stands,
-drives, stops it whatever happened, and lets go. While a person is at the robot, nobody
+Each drive opens the connection, makes sure that the robot stands, drives, stops the
+robot in any case, and closes the connection. While a person is at the robot, no program
 is connected to it.
 """
 

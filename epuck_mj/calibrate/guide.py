@@ -64,7 +64,7 @@ class Person:
         """Ask for something to be done and wait for Enter.
 
         Raises:
-            UserError: if nobody answers any more.
+            UserError: if the input has ended.
         """
         self._answer(f"{what}\nThen press Enter: ")
 
@@ -72,7 +72,7 @@ class Person:
         """Ask until the answer is yes or no; whether it is yes.
 
         Raises:
-            UserError: if nobody answers any more.
+            UserError: if the input has ended.
         """
         while True:
             answer = self._answer(f"{question} [y/n]: ").lower()
@@ -84,7 +84,7 @@ class Person:
         """Ask until the answer is a number within limits; that number.
 
         Raises:
-            UserError: if nobody answers any more.
+            UserError: if the input has ended.
         """
         while True:
             answer = self._answer(f"{question}: ")

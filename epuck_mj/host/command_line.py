@@ -93,7 +93,7 @@ def main(run: Callable[[Sequence[str]], int]) -> None:
     except KeyboardInterrupt:
         status = 130
     except BrokenPipeError:
-        # whoever reads has gone; python's own flush at exit must not complain
+        # stdout is closed; python's own flush at exit must not complain
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 1
     sys.exit(status)

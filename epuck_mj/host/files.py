@@ -41,7 +41,7 @@ def write_bytes(path: Path, content: bytes) -> None:
             temporary.unlink(missing_ok=True)
             raise
     except OSError as error:
-        # of the temporary one nobody has heard
+        # the user does not know the temporary file
         error.filename, error.filename2 = str(asked), None
         raise
 

@@ -2,7 +2,7 @@
 
 An arena is any MJCF with walls. It may include a robot, so that MuJoCo's viewer shows
 the whole scene; `load_scene` puts the robot asked for in that one's place. Robots
-differ in their base and nothing else: everybody else calls `Scene.qpos` and friends.
+differ in their base only, which the methods of `Scene` hide from other modules.
 """
 
 import hashlib
@@ -98,7 +98,7 @@ def once_per_model(measure: Measure) -> Measure:
     """Compute a function of a scene only once for scenes that are compiled alike.
 
     Its result depends on the model and on arguments behind the scene that can be
-    compared; whoever gets it must not change it.
+    compared. Callers must not change the result.
     """
     known: dict[object, Any] = {}
 

@@ -238,7 +238,7 @@ class Everybody:
         return self._policy(observation)
 
     def __getitem__(self, index: np.ndarray | slice) -> Self:
-        """Itself."""
+        """The policy itself, as all members are the same."""
         return self
 
     def started(self, n: int | None) -> BatchPolicy:
@@ -262,10 +262,10 @@ def run_trials(
         policy: one member per start.
         starts: poses `(trials, 3)`: x, y [m], yaw [rad].
         task: what a trial is.
-        lost: asked after every step which trials to break off, uncrashed, with what
-            they have earned so far; None lets all of them live, as a step fitness
-            without a maximum does.
-        watcher: told of starts and steps; None if nobody watches.
+        lost: asked after every step which trials to end early, without a crash and
+            with their fitness so far; None ends none, nor does a step fitness without
+            a maximum.
+        watcher: told of starts and steps; None for no watcher.
     """
     n_trials = len(starts)
     fitness = np.zeros(n_trials)

@@ -30,7 +30,7 @@ class Reading:
         proximity: counts that `distance` comes from, `(..., 8)`; None of sensors that
             measure distance itself.
         truth: metres along the rays as they are, `(..., 8)`; None where `distance` is
-            that, or where nobody knows.
+            that, or if unknown.
     """
 
     distance: np.ndarray

@@ -113,7 +113,7 @@ def open_window(model: mujoco.MjModel, data: mujoco.MjData) -> Iterator[Any]:
         ) from None
     try:
         with window.lock():
-            # rays go on for ever; controllers see four centimetres of them
+            # rays have no end; controllers see four centimetres of them
             window.opt.flags[mujoco.mjtVisFlag.mjVIS_RANGEFINDER] = False
         yield window
     finally:

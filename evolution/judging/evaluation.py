@@ -3,9 +3,9 @@
 Two engines with the same bits: `batch` steps all robots at once on
 `mujoco.batch.Batch`; `dm_control` steps the dm_control task, one trial after another.
 
-Racing: an individual that only matters if it beats a known fitness is broken off as
-soon as it no longer can, since no control step is worth more than 1. Whoever beats
-what it has to has lived all its trials, so no comparison comes out differently.
+Racing: an individual that only matters if it exceeds a known fitness is ended as soon
+as it cannot reach that any more, since no control step is worth more than 1. One that
+exceeds it has all its trials, so every comparison has the same outcome.
 """
 
 from collections.abc import Iterator
@@ -148,7 +148,7 @@ class BatchEngine:
     def run(self, work: Work) -> Trials:
         """See `Engine.run`."""
         if work.race is not None and work.race.trials > self._robots.capacity:
-            # an individual does not fit: nobody is broken off
+            # an individual does not fit: none is ended early
             work = replace(work, race=None)
         parts = [
             run_trials(
@@ -211,10 +211,10 @@ def evaluate(
         engine: what runs the trials.
         topology: what genomes decode to.
         genomes: `(individuals, genes)`.
-        starts: poses `(trials, 3)`, x, y [m], yaw [rad]: the same for everybody.
-        to_beat: fitness `(individuals,)` below which nobody cares how far below;
-            None if every fitness matters.
-        disturbances: of the trials, the same for everybody; None for ideal robots.
+        starts: poses `(trials, 3)`, x, y [m], yaw [rad], for all individuals.
+        to_beat: fitness `(individuals,)` that each has to exceed to matter; None if
+            every fitness matters.
+        disturbances: of the trials, for all individuals; None for ideal robots.
     """
     shape = (len(genomes), len(starts))
     controller = topology.decode(np.repeat(genomes, len(starts), axis=0))

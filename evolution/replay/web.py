@@ -1,7 +1,7 @@
 """A recording as a web page: a folder that any web server can publish.
 
 The viewer is the one in rerun's wheel. It is served by rerun itself and not stored as
-files, so the folder gets copies. The page keeps it from calling anybody.
+files, so the folder gets copies. The page keeps it from contacting other servers.
 """
 
 import functools

@@ -1,9 +1,9 @@
 """Verdicts on claims: what runs have to show for or against one.
 
 As in the report, fewer than 10 runs of an algorithm give none. An order needs
-a Mann-Whitney p below 0.05, adjusted for the pairs of its kind; a statement about
-every run a Wilson interval on one side of one half; the best of a few runs of somebody
-else has to have a rank among ours that is not too extreme.
+a Mann-Whitney p below 0.05, adjusted for the pairs of its kind. A statement about every
+run needs a Wilson interval on one side of one half. The best of the paper's few runs
+needs a rank among ours that is not too extreme.
 """
 
 from math import comb, floor

@@ -159,8 +159,8 @@ def _carry_out(run: "Run", live: bool) -> int:
                 scores = _finished(run, live)
         except Interrupted:
             print(
-                f"Interrupted after {directory.evaluations():,} evaluations; go on "
-                f"with: {shell_command(MODULE, '--resume', directory.path)}",
+                f"Interrupted after {directory.evaluations():,} evaluations; "
+                f"continue with: {shell_command(MODULE, '--resume', directory.path)}",
                 file=sys.stderr,
             )
             return interruption.status

@@ -93,7 +93,7 @@ class RunDirectory:
         if used:
             raise UserError(
                 f"output '{self.path}' is not empty: expected a new directory, or "
-                f"--resume {self.path} to go on with what is there"
+                f"--resume {self.path} to continue the run in it"
             )
 
     def create(self, config: ExperimentConfig, provenance: dict) -> None:

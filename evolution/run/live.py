@@ -1,7 +1,7 @@
 """Live view: a run in a rerun viewer, by a process of its own.
 
-Evolution hands over what it has and never waits: what a slow viewer has no time for is
-left out, and one that goes away takes nothing with it.
+Evolution hands its records over and never waits: generations for which a slow viewer
+has no time are left out, and a viewer that is closed does not stop the run.
 """
 
 import multiprocessing
@@ -89,7 +89,7 @@ class Live:
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
-        # nobody is left to read it
+        # the viewer's process has ended
         self._queue.cancel_join_thread()
         self._queue.close()
 
@@ -132,7 +132,7 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
     """Show generations until the run has ended.
 
     Raises:
-        ConnectionError: if the viewer has gone, or takes nothing.
+        ConnectionError: if the viewer was closed, or accepts nothing.
     """
     # rerun is loaded by those who use it
     from epuck_mj.show.recording.live import LiveView

@@ -112,7 +112,7 @@ def study(argv: Sequence[str]) -> int:
                 )
         except Interrupted:
             again = shell_command(MODULE, *argv)
-            print(f"Interrupted; go on with: {again}", file=sys.stderr)
+            print(f"Interrupted; continue with: {again}", file=sys.stderr)
             return interruption.status
     done = len(everything) - len(failed)
     minutes = (time.monotonic() - started) / 60
@@ -134,7 +134,7 @@ def _measure_yardstick(directory: StudyDirectory) -> None:
     config = next(iter(directory.stored_config().experiments.values()))
     judges, n = Judges().tested_on(config.robot, config.setting), config.test_starts
     tests = {robot: judge.test(WallFollower(), n) for robot, judge in judges.items()}
-    # whoever opens the study removes what looks left over
+    # opening the study removes what looks left over
     with locked(directory.path, PATIENCE), files.writing():
         text = json.dumps(KnownScores(held_out=tests).to_dict(), indent=1) + "\n"
         files.write_text(directory.yardstick, text)

@@ -76,7 +76,7 @@ class StudyDirectory:
                     f"output '{self.path}' is not empty and holds no study: expected "
                     "a new directory, or one with a study.yaml"
                 )
-            # somebody else may be about to add experiments or seeds
+            # another process may be about to add experiments or seeds
             with locked(self.path, PATIENCE):
                 files.remove_leftovers(self.path)
                 asked = self.asked_seeds()

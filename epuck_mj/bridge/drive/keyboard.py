@@ -1,6 +1,6 @@
 """Stop keys of a terminal, read one by one without Enter.
 
-Where standard input is no terminal, nobody can press a key.
+Without a terminal as standard input there are no keys.
 """
 
 import os

@@ -31,7 +31,7 @@ class Mission:
         policy: that drives it.
         task: control step, speeds, fitness.
         scene: to show the log in.
-        calibration: in what the robot differs from the robot of the books.
+        calibration: how the robot differs from the nominal one.
         n_steps: control steps.
         start: pose: x, y [m], yaw [rad].
         speed_max: no wheel rolls faster than this [m/s].
@@ -99,7 +99,7 @@ def accomplish(
             status = interruption.status
             still = "the robot stands still" if robot and robot.met else "never began"
             word = f"{interruption.signum.name}: ended, {still}"
-        # nobody may be there to read the rest
+        # stdout may be closed
         if status:
             print(word, file=sys.stderr, flush=True)
         print(facts, flush=True)

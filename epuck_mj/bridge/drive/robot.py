@@ -70,7 +70,7 @@ class RealRobot:
 
         Args:
             connection: how to reach it.
-            calibration: in what it differs from the robot of the books.
+            calibration: how it differs from the nominal robot.
             control_step: duration of a control step [s].
             speed_max: no wheel rolls faster than this [m/s].
             dry_run: whether it has to stand still all the time.

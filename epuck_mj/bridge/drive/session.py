@@ -64,7 +64,7 @@ class Session:
         """Yield control steps as they happen; does not stop the robot.
 
         Args:
-            robot: to drive; whoever called stops it.
+            robot: to drive; the caller stops it.
             policy: called with observations `(8,)`, gives actions `(2,)`.
             n_steps: how many there are at most.
             clock: the robot's.
@@ -88,7 +88,7 @@ class Session:
     def trajectory(self, policy: Policy) -> Trajectory | None:
         """Trajectory of the drive, as of a simulated one; None if nothing was read.
 
-        The pose is by odometry; nobody knows of contacts; commands are those sent.
+        The pose is odometry; contacts are unknown; commands are those sent.
         """
         if self.start is None or self.reading is None:
             return None

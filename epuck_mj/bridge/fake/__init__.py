@@ -1,7 +1,7 @@
 """A robot to try the bridge on: `python -m epuck_mj.bridge.fake`.
 
-An e-puck's firmware, quirks included, in a body that lives in MuJoCo. Whoever opens its
-port finds nothing that a real one would not say.
+An e-puck's firmware, oddities included, with a body that is simulated by MuJoCo. Its
+port sends only what a real robot would send.
 
 - `firmware`, `wifi_firmware`: what the robot's programs make of bytes; the `builds`
   there are;

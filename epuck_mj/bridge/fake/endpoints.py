@@ -133,7 +133,7 @@ class Tcp:
             port: its number; 0 takes any that is free.
 
         Raises:
-            UserError: if somebody else has it.
+            UserError: if another program has it.
         """
         self._port = port
         self._host: socket.socket | None = None

@@ -6,7 +6,7 @@ It does what the real ones do, quirks included:
 - a zero between commands is ignored; a return that ends no line makes of the next byte
   the first one of a line, even if it is a binary command;
 - binary replies come once, after the packet's zero; a packet of D, L and P has none;
-- while it calibrates it serves nobody, and its receive ring overflows;
+- while it calibrates it handles no commands, and its receive ring overflows;
 - the banner comes at a reset only; a reset forgets everything;
 - speeds saturate in silence while E tells them as they came; see `motors_and_sensors`
   for what the motors make of them.

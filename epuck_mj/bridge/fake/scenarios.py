@@ -27,8 +27,8 @@ class Kind:
 
 KINDS = {
     "loss": Kind(0.5, "a byte in fifty is lost, both ways"),
-    "garbage": Kind(0.0, "bytes that nobody sent reach the host"),
-    "noise": Kind(0.0, "bytes that nobody sent reach the robot"),
+    "garbage": Kind(0.0, "random bytes reach the host"),
+    "noise": Kind(0.0, "random bytes reach the robot"),
     "stall": Kind(0.5, "nothing gets through, both ways, and then all of it"),
     "disconnect": Kind(1.0, "the port vanishes, and returns"),
     "gone": Kind(float("inf"), "the port vanishes for ever"),

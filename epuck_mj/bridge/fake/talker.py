@@ -28,8 +28,8 @@ class Talker(ABC):
     def output(self, now: float) -> bytes:
         """The bytes sent since the last call, up to a time [s].
 
-        To be called often: it also is what makes time go by, and sensors are read
-        when their time has come and somebody calls.
+        To be called often: time passes only in this call, and sensors are read at the
+        first call after their time.
         """
         self._advance(now)
         out = bytes(self._out)

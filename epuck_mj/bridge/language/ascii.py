@@ -137,7 +137,7 @@ def led_order(number: int, value: int) -> Request[Acknowledged]:
 def calibration_order() -> Request[Calibrated]:
     """K: the sensors' offsets are measured anew; nothing may be in their range.
 
-    The robot serves nobody meanwhile, and its motors go on.
+    Meanwhile the robot handles no commands, and its motors continue.
     """
     lines = (
         Line(re.compile(rb"k, Starting calibration[ -~]*\r\Z"), None, "'k, Starting'"),

@@ -153,7 +153,7 @@ class LinesParser(Generic[T]):
 class BytesParser(Generic[T]):
     """Parser of a binary reply with a fixed number of bytes.
 
-    They bear no mark. Whoever asks makes sure that nothing else is under way.
+    The bytes bear no mark. The caller makes sure that no other reply is under way.
     """
 
     def __init__(self, what: str, length: int, reply: Callable[[bytes], T]) -> None:

@@ -7,7 +7,7 @@ A link does this, and this only:
 2. a reply: done. What is left over then, in `parser.rest` or in the port, is dropped
    before the next request if that one is ASCII; if it is binary, go to step 3;
 3. no reply in time, or BridgeError: the two are out of step; go through `RESYNC`,
-   then send the speeds again: nobody knows which speeds the robot has made of it;
+   then send the speeds again, since it is unknown which speeds arrived;
 4. RobotRestarted, or `greets` of what was dropped: the robot stands still and has lost
    its calibration.
 

@@ -137,7 +137,7 @@ class Link:
             Whether the robot's banner came: it was reset.
 
         Raises:
-            BridgeError: if there is nobody who answers as an e-puck.
+            BridgeError: if no e-puck answers.
             LinkLost: if the port is gone.
         """
         restarted, came = False, b""

@@ -31,7 +31,7 @@ class SerialLine:
         except LinkLost:
             raise
         except BridgeError:
-            # half a word of whoever was there before
+            # an incomplete command of an earlier connection
             pass
         self._link.resync(until)
         self._link.ask(ascii.stop_order(), until)
@@ -61,7 +61,7 @@ class SerialLine:
                     self.n_repairs += 1
                     if self._link.resync(until):
                         raise RobotRestarted("a robot that goes on", "its banner")
-                    # nobody knows what it has made of the last speeds
+                    # it is unknown whether the last speeds arrived
                     changed = True
                 return self._link.ask(
                     binary.echoed_cycle_packet(left, right, changed), until
@@ -83,7 +83,7 @@ class SerialLine:
     def stop(self) -> None:
         """See Connection."""
         now = self._link.clock()
-        # while it calibrates it hears nobody
+        # while it calibrates it handles no commands
         until = max(now, self._busy_until) + STOP_TIME_MAX
         problem: BridgeError | None = None
         while problem is None or self._link.clock() < until:

@@ -51,7 +51,7 @@ class WifiLine:
             sleep: lets so many seconds go by.
 
         Raises:
-            UserError: if nobody is there.
+            UserError: if there is no robot.
         """
         self._clock = clock
         self._sleep = sleep

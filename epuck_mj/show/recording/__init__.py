@@ -62,7 +62,7 @@ def save_recording(
         summary: Markdown for the text panel.
 
     Raises:
-        UserError: if it cannot be written, or nobody can measure clearance here.
+        UserError: if it cannot be written, or clearance cannot be measured here.
     """
     probe = ClearanceProbe(scene, 1)
     places = entities([trial.name for trial in trials])

@@ -89,7 +89,7 @@ class Cluster:
         """Number of threads of all workers; 0 while there is no worker.
 
         Raises:
-            ClusterLost: if the moment has lasted too long, or nobody answers.
+            ClusterLost: if there was no worker for too long, or no scheduler answers.
         """
         if self._client.status != "running":
             raise self._lost()
@@ -110,7 +110,7 @@ class Cluster:
         """Submit a task to a worker, or to another one if that dies.
 
         Raises:
-            ClusterLost: if there is nobody to take it.
+            ClusterLost: if the scheduler is lost.
         """
         if self._client.status != "running":
             raise self._lost()
@@ -138,7 +138,7 @@ class Cluster:
         except CancelledError:
             raise self._lost() from None
         except TimeoutError:
-            # whoever waits for nobody hears of it here
+            # raises if there is no worker any more
             self.n_threads()
         return answers
 
@@ -188,7 +188,7 @@ def connected(address: str) -> Iterator[Cluster]:
     """The cluster at an address of `carry_out_on_cluster`.
 
     Raises:
-        UserError: if nobody answers there.
+        UserError: if no scheduler answers there.
     """
     # its news are for those who run the cluster; what concerns us is raised
     for name in LOGGERS:

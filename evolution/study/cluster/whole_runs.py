@@ -148,7 +148,7 @@ def _keep(job: Job, found: Mapping[str, bytes]) -> None:
     last = directory.provenance.name
     middle = [name for name in found if name not in (*first, last)]
     with directory.locked(PATIENCE), files.writing():
-        # somebody else may have been there meanwhile
+        # another process may have been there meanwhile
         _refuse_foreign(directory, job)
         if not directory.finished:
             files.remove_leftovers(directory.path)
