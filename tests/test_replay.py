@@ -329,7 +329,7 @@ def test_a_robots_own_trajectory_needs_no_simulation(here):
         ["--pose", "0", "0", "0"],
         ["--generations", "0"],
     ):
-        assert "expected a policy for --trials" in refused("robot.npz", *option)
+        assert "expected a policy with --trials" in refused("robot.npz", *option)
 
 
 def test_a_viewer_opens_where_there_is_a_display(champion, here, monkeypatch, capsys):
