@@ -60,14 +60,7 @@ def measure(argv: Sequence[str]) -> int:
             record(scene, policy.policy, starts[0], policy.task)
 
         def replay() -> None:
-            command = [
-                sys.executable,
-                "-m",
-                "evolution.replay",
-                RUN,
-                "--save",
-                str(one),
-            ]
+            command = [sys.executable, "-m", "evolution.replay", RUN, "--save", one]
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
         figures = {

@@ -11,16 +11,12 @@ import tyro
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import check_threads, main, parse
-from epuck_mj.policies.wall_follower import YARDSTICK
 from epuck_mj.step.conditions import ConditionFlags, Conditions
 from epuck_mj.step.disturbances import Disturbances
-from evolution.judging.held_out_starts import (
-    N_TEST,
-    STARTS_MAX,
-    held_out_disturbances,
-)
+from evolution.judging.held_out_starts import held_out_disturbances
 from evolution.judging.scores import HeldOut
-from evolution.named_policies import named_policies
+from evolution.named_policies import policies_of
+from evolution.settings.config_fields import N_TEST, STARTS_MAX
 from evolution.settings.randomness import Purpose
 from evolution.settings.setting import Setting
 
@@ -56,24 +52,12 @@ class Options:
 
 
 def evaluate_policies(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status.
-
-    Raises:
-        UserError: for anything the user can put right.
-    """
+    """Run the command line; its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv)
     if not 2 <= options.starts <= STARTS_MAX:
         raise UserError(f"expected 2 to {STARTS_MAX} starts, got {options.starts}")
     check_threads(options.threads)
-    if not options.paths:
-        raise UserError(
-            f"expected run or study directories, controller files, or {YARDSTICK}"
-        )
-    candidates = [
-        found
-        for path in options.paths
-        for found in named_policies(path, options.generations)
-    ]
+    candidates = policies_of(options.paths, options.generations)
     conditions = options.robots.conditions or Conditions()
     if options.json is not None:
         files.check_writable(options.json)
@@ -98,11 +82,7 @@ def evaluate_policies(argv: Sequence[str]) -> int:
             )
             print(f"{candidate.name}, {Path(robot).name} in {Path(arena).name}")
             print(_described(test, steps), flush=True)
-            where = {
-                "name": candidate.name,
-                "robot": robot,
-                "arena": arena,
-            }
+            where = {"name": candidate.name, "robot": robot, "arena": arena}
             tests.append(where | asdict(conditions) | test.to_dict())
     if options.json is not None:
         with files.writing():

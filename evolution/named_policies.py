@@ -6,7 +6,7 @@ and the follower written by hand.
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -99,6 +99,22 @@ def named_policies(path: str, generations: str | None = None) -> list[NamedPolic
         )
         for run in runs
     ]
+
+
+def policies_of(
+    paths: Iterable[str], generations: str | None = None
+) -> list[NamedPolicy]:
+    """The policies at several paths; see `named_policies`.
+
+    Raises:
+        UserError: if there are no paths, or no policies at one.
+    """
+    found = [each for path in paths for each in named_policies(path, generations)]
+    if not found:
+        raise UserError(
+            f"expected run or study directories, controller files, or {YARDSTICK}"
+        )
+    return found
 
 
 def _champion(path: Path, name: str, config: ExperimentConfig | None) -> NamedPolicy:

@@ -47,11 +47,7 @@ class Options:
 
 
 def verify(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status.
-
-    Raises:
-        UserError: for anything the user can put right.
-    """
+    """Run the command line; its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv)
     check_threads(options.threads)
     runs = [run for path in options.paths for run in _runs(path)]
@@ -83,10 +79,7 @@ def _runs(path: Path) -> list[RunDirectory]:
 
 def _verified(run: RunDirectory, judges: "Judges") -> bool:
     """Verify a run and print the outcome; whether all scores are the same."""
-    config, champion = (
-        run.stored_config(),
-        load_controller(run.champion),
-    )
+    config, champion = run.stored_config(), load_controller(run.champion)
     scores = Scores.read(champion.scores, run.champion)
     differing = [
         *_differing(champion, scores, config, judges),
@@ -105,10 +98,7 @@ def _verified(run: RunDirectory, judges: "Judges") -> bool:
 
 
 def _differing(
-    champion: ControllerFile,
-    scores: Scores,
-    config: ExperimentConfig,
-    judges: "Judges",
+    champion: ControllerFile, scores: Scores, config: ExperimentConfig, judges: "Judges"
 ) -> Iterator[str]:
     """Differences between the champion's held-out tests and its stored scores."""
     for tests in (scores.held_out, scores.held_out_as_evolved):
@@ -135,10 +125,7 @@ def _differing(
 
 
 def _most_believed(
-    run: RunDirectory,
-    scores: Scores,
-    config: ExperimentConfig,
-    judges: "Judges",
+    run: RunDirectory, scores: Scores, config: ExperimentConfig, judges: "Judges"
 ) -> Iterator[str]:
     """Differences in the fitness of the individual with the highest stored fitness."""
     written = scores.most_believed
@@ -156,9 +143,7 @@ def _most_believed(
 
 
 def _edited(
-    champion: ControllerFile,
-    config: ExperimentConfig,
-    judges: "Judges",
+    champion: ControllerFile, config: ExperimentConfig, judges: "Judges"
 ) -> Iterator[str]:
     """Texts about robot, arena and own parts that were edited since the run."""
     now = dict(judges.of(config.robot, config.setting).scene.sha256)

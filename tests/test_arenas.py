@@ -63,15 +63,15 @@ def test_mujoco_and_every_robot_load_it(path: Path):
 def test_starts_touch_nothing_and_reach_all_of_the_free_space(path: Path, robot: str):
     scene = load_scene(robot, path.stem)
     space = FreeSpace(scene, START_CLEARANCE)
-    starts = space.sample(np.random.default_rng(0), 2000)
+    starts = space.sample(np.random.default_rng(0), 1000)
     assert ClearanceProbe(scene, 1).measure(starts).distance.min() > (
         START_CLEARANCE - 1e-4
     )
     grid = space.grid
     nodes = grid.nodes[grid.inside]
     far, _ = spatial.KDTree(starts[:, :2]).query(nodes)
-    # 2,000 starts in two square metres lie a few centimetres apart
-    assert far.max() < 0.12
+    # 1,000 starts in two square metres lie a few centimetres apart
+    assert far.max() < 0.17
 
 
 @arenas

@@ -23,6 +23,7 @@ from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.bridge.line.wifi_line import WifiLine
 from epuck_mj.calibrate.__main__ import calibrate, calibrate_robot
+from epuck_mj.calibrate.bench import N_TURNS
 from epuck_mj.calibrate.fitting import (
     SATURATED,
     fit_gains,
@@ -237,10 +238,11 @@ class Body(MujocoBody):
 class Person:
     """Somebody who does what is asked, and whose ruler is exact."""
 
-    def __init__(self, body, settle, changes=()):
+    def __init__(self, body, settle, turns=N_TURNS):
         self.body = body
         self.settle = settle
-        self.changes = dict(changes)
+        self.turns = turns
+        self.changes = {}
         self.asked = []
 
     def __call__(self, question):
@@ -262,7 +264,7 @@ class Person:
             return str((self.front() - self.start_front)[0])
         elif "above 0" in question:
             yaw = np.unwrap([pose[2] for pose in self.body.journal.pose[self.since :]])
-            return f"{math.degrees(yaw[-1] - yaw[0]) - 3 * 360:.1f}"
+            return f"{math.degrees(yaw[-1] - yaw[0]) - self.turns * 360:.1f}"
         elif "[y/n]" in question:
             return "y"
         return ""
@@ -329,13 +331,9 @@ def output(tmp_path):
     return tmp_path / "robot.yaml"
 
 
-@pytest.mark.parametrize(
-    ("robot", "latency"),
-    [("asercom", 0.0), ("btcom", 0.03), ("epuck2", 0.01), ("wifi", 0.0)],
-)
-def test_another_robot(tmp_path, output, robot, latency, capsys):
-    scene = changed_robot(tmp_path, RADII, 0.0562)
-    world = World(scene, GAINS, robot=robot, latency=latency)
+@pytest.mark.parametrize("robot", ["asercom", "wifi"])
+def test_another_robot(tmp_path, output, robot, capsys):
+    world = World(changed_robot(tmp_path, RADII, 0.0562), GAINS, robot=robot)
     world.body.offset, world.body.noise = 60, 1.0
     assert world.calibrate(output) == 0
     found = Calibration.load(output)
@@ -349,6 +347,26 @@ def test_another_robot(tmp_path, output, robot, latency, capsys):
     assert "left wheel radius 19.95 mm; before 19.96" in out
     assert "warning" not in out
     assert out.count(f"written: {output}") == 3
+
+
+@pytest.mark.parametrize(
+    ("robot", "latency", "steps"),
+    [("btcom", 0.03, ("sensors",)), ("epuck2", 0.01, ("straight", "turn"))],
+)
+def test_other_firmware_on_a_slow_line(tmp_path, output, robot, latency, steps):
+    """They set their zero in ways of their own; what they count is the same."""
+    scene = changed_robot(tmp_path, RADII, 0.0562)
+    world = World(scene, GAINS, robot=robot, latency=latency)
+    world.body.offset, world.body.noise = 60, 1.0
+    if "straight" not in steps:
+        Calibration(wheel_radii=RADII, track=0.0562).save(output)
+    assert world.calibrate(output, *steps) == 0
+    found = Calibration.load(output)
+    assert found.wheel_radii == pytest.approx(RADII, rel=0.002)
+    assert found.track == pytest.approx(0.0562, rel=0.002)
+    if "sensors" in steps:
+        np.testing.assert_allclose(found.gains, GAINS, rtol=0.04)
+    assert world.body.standing
 
 
 def test_a_robot_on_wheels(output):
@@ -385,23 +403,19 @@ def test_one_step_keeps_what_the_others_found(planar, output):
 
 def test_bad_answers_are_asked_again(planar, output, capsys):
     world = World(planar)
-    bad = ["", "half a metre", "51.5", "nan", "-0.5"]
-    world.person.changes = {"metres": [lambda: bad.pop(0)] * len(bad)}
+    # a comma is as good as a point
+    answers = ["", "half a metre", "51.5", "nan", "-0.5", "0,515"]
+    world.person.changes = {"metres": [lambda: answers.pop(0)] * len(answers)}
     assert world.calibrate(output, "straight") == 0
     out = capsys.readouterr().out
     assert "expected a number from 0.05 to 2, got '51.5'" in out
     assert out.count("expected a number") == 5
-    world.person.changes = {"[y/n]": [lambda: "perhaps"]}
-    assert world.calibrate(output, "sensors") == 0
-    assert "expected y or n, got 'perhaps'" in capsys.readouterr().out
-
-
-def test_a_comma_for_a_point(planar, output):
-    world = World(planar)
-    world.person.changes = {"metres": [lambda: "0,515"]}
-    assert world.calibrate(output, "straight") == 0
     found = Calibration.load(output)
     assert found.wheel_radius == pytest.approx(WHEEL_RADIUS, rel=0.002)
+    world.person.changes = {"[y/n]": [lambda: "perhaps"], "mm of air": [end_of_input]}
+    with pytest.raises(UserError, match="got the end of the input"):
+        world.calibrate(output, "sensors")
+    assert "expected y or n, got 'perhaps'" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -429,16 +443,24 @@ def end_of_input():
     raise EOFError
 
 
-@pytest.mark.parametrize("part", ["m clear before", "metres", "[y/n]", "mm of air"])
-def test_the_end_of_the_input(planar, output, part):
+@pytest.mark.parametrize(
+    ("steps", "part"),
+    [
+        ((), "m clear before"),
+        ((), "metres"),
+        (("turn", "sensors"), "[y/n]"),
+        (("turn", "sensors"), "mm of air"),
+    ],
+)
+def test_the_end_of_the_input(planar, output, steps, part):
     world = World(planar)
     world.person.changes = {part: [end_of_input]}
     with pytest.raises(UserError, match="got the end of the input") as caught:
-        world.calibrate(output)
+        world.calibrate(output, *steps)
     assert "\n" not in str(caught.value)
     assert world.body.standing
     # steps that were done are not lost
-    assert output.exists() == (part in ("[y/n]", "mm of air"))
+    assert output.exists() == ("turn" in steps)
 
 
 # what goes wrong on the way
@@ -491,7 +513,7 @@ def test_a_signal_while_it_drives(planar, output, capsys, handlers, monkeypatch)
 
 def test_a_signal_at_a_question(planar, output, handlers):
     world = World(planar)
-    world.person.changes = {"metres": [lambda: signal.raise_signal(signal.SIGTERM)]}
+    world.person.changes = {"before": [lambda: signal.raise_signal(signal.SIGTERM)]}
     assert world.calibrate(output) == 128 + signal.SIGTERM
 
 
@@ -521,7 +543,19 @@ def test_bad_input(arguments, message, tmp_path, monkeypatch):
 
 
 SPEED = 2.25
-"""Of the emulated robot's time: a whole calibration in half a minute."""
+"""Of the emulated robot's time."""
+
+SHORT = """
+from epuck_mj.calibrate import bench, guide
+from epuck_mj.calibrate.__main__ import calibrate
+from epuck_mj.host.command_line import main
+
+bench.N_STEPS = guide.N_STEPS = 1500
+bench.N_TURNS = guide.N_TURNS = 1
+guide.CLEARANCES = (0.010, 0.020)
+main(calibrate)
+"""
+"""The command on ways that take it seconds instead of a minute."""
 
 
 def clock():
@@ -537,10 +571,12 @@ def own_robot(endpoint, scene):
         yield body
 
 
-def started(port, *arguments, stdin=subprocess.PIPE):
+def started(
+    port, output, stdin: int = subprocess.PIPE, command=("-m", "epuck_mj.calibrate")
+):
     """A calibration that is under way; killed if it hangs."""
-    module = ("-W", "error", "-m", "epuck_mj.calibrate")
-    return python_process(*module, "--port", str(port), *arguments, stdin=stdin)
+    arguments = ("--port", str(port), "--output", str(output))
+    return python_process("-W", "error", *command, *arguments, stdin=stdin)
 
 
 def answered(process, person):
@@ -562,8 +598,8 @@ def test_the_whole_command(tmp_path, output):
     with own_robot(port, scene) as body:
         # a machine so busy that the watchdog saw it gets more chances
         for chance in (3, 2, 1):
-            person = Person(body, lambda: time.sleep(0.1))
-            with started(port.name, "--output", str(output)) as process:
+            person = Person(body, lambda: time.sleep(0.1), turns=1)
+            with started(port.name, output, command=("-c", SHORT)) as process:
                 said = answered(process, person)
                 _, error = process.communicate(timeout=PATIENCE)
             assert body.standing
@@ -574,7 +610,8 @@ def test_the_whole_command(tmp_path, output):
     found = Calibration.load(output)
     assert found.wheel_radii == pytest.approx(RADII, rel=0.005)
     assert found.track == pytest.approx(0.0562, rel=0.01)
-    np.testing.assert_allclose(found.gains, GAINS, rtol=0.05)
+    # turns of a busy machine have fewer readings; see test_another_robot
+    np.testing.assert_allclose(found.gains, GAINS, rtol=0.1)
 
 
 @pytest.mark.slow
@@ -583,7 +620,7 @@ def test_signals(planar, tmp_path, output, signum):
     port = Pty(tmp_path / "e-puck")
     with (
         living(port, planar) as emulator,
-        started(port.name, "--output", str(output)) as process,
+        started(port.name, output) as process,
     ):
         assert process.stdin is not None
         process.stdin.write("\n")
@@ -602,7 +639,7 @@ def test_signals(planar, tmp_path, output, signum):
 def test_signals_at_a_terminals_question(tmp_path, output, signum):
     master, slave = pty.openpty()
     try:
-        with started("unused", "--output", str(output), stdin=slave) as process:
+        with started("unused", output, stdin=slave) as process:
             assert process.stdout is not None
             while not process.stdout.readline().startswith("Mark where"):
                 pass
@@ -621,7 +658,7 @@ def test_nobody_answers(planar, tmp_path, output):
     port = Pty(tmp_path / "e-puck")
     with (
         living(port, planar),
-        started(port.name, "--output", str(output)) as process,
+        started(port.name, output) as process,
     ):
         _, error = process.communicate("", timeout=PATIENCE)
     assert process.returncode == 2

@@ -10,6 +10,7 @@ import pytest
 from epuck_mj.host import files
 from epuck_mj.policies.file import Origin, load_controller
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
+from epuck_mj.show import figures, pictures, recording
 from epuck_mj.step.control import control_step
 from epuck_mj.step.sensors import observe
 from epuck_mj.trials.recorder import record
@@ -274,7 +275,14 @@ def test_the_champion_file_holds_every_score(written):
 def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
     tmp_path, monkeypatch
 ):
+    # the trajectory is enough of what is shown
     monkeypatch.setattr(results, "_draw_fitness", lambda *_: None)
+    for module, name in (
+        (figures, "trajectory_figure"),
+        (pictures, "save_figure"),
+        (recording, "save_recording"),
+    ):
+        monkeypatch.setattr(module, name, lambda *_: None)
     config = tiny("ga", steps=60, noise="strong", randomise=True)
     experiment = Evolution(config, threads=1)
     list(experiment.run())

@@ -1,6 +1,7 @@
 """Operators worked by hand, a slow oracle, degenerate cases, and scipy's version."""
 
 import itertools
+from functools import cache
 
 import numpy as np
 import pytest
@@ -322,7 +323,7 @@ def test_reevaluated_parents_are_asked_first_and_judged_afresh():
 
 # --- Against scipy, in distribution --------------------------------------------------
 
-N_SEEDS, N_GENERATIONS, N_POPULATION, N_GENES = 60, 40, 30, 5
+N_SEEDS, N_GENERATIONS, N_POPULATION, N_GENES = 40, 30, 30, 5
 BOX = SearchSpace(genes=N_GENES, lower=-5, upper=5, init_lower=-5, init_upper=5)
 
 
@@ -340,6 +341,7 @@ def corner(genomes: np.ndarray) -> np.ndarray:
 COSTS = {"rosenbrock": rosenbrock, "corner": corner}
 
 
+@cache
 def our_log_costs(cost, strategy, crossover=0.9, rule="reinit"):
     """Log of the best cost of each seed `(N_SEEDS,)`, and the initial populations."""
     costs, initials = [], []

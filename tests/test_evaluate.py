@@ -15,6 +15,7 @@ from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.calibration import Calibration
 from evolution.evaluate import evaluate_policies
 from evolution.judging.held_out import Judge, Judges
+from evolution.run import results
 from evolution.run.directory import RunDirectory
 from evolution.run.execution import Run
 from evolution.run.means import Means
@@ -25,7 +26,7 @@ from evolution.verify import verify
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory) -> Path:
-    """A study directory of a single, tiny run."""
+    """A study directory of a single, tiny run, without the pictures."""
     fields = load_config(find_config("ga")).model_dump()
     fields |= {"evaluations": 20, "steps": 20, "trials": 2}
     fields |= {"validation_starts": 10, "test_starts": 30}
@@ -34,7 +35,10 @@ def finished(tmp_path_factory) -> Path:
     run = Run(ExperimentConfig.parsed(fields, "ga"), RunDirectory(path), Means(), ())
     run.start()
     assert len(list(run.evolve())) == 2
-    run.finish()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(results, "_draw_fitness", lambda *_: None)
+        patch.setattr(results, "_show", lambda *_: None)
+        run.finish()
     return path
 
 
@@ -128,13 +132,13 @@ def test_threads_change_nothing(scene):
     from epuck_mj.policies.wall_follower import WallFollower
     from epuck_mj.step.control import TaskParameters
 
-    space, task = FreeSpace(scene, 0.01), TaskParameters(steps=50)
+    space, task = FreeSpace(scene, 0.01), TaskParameters(steps=20)
     tests = [
-        Judge(scene, space, task, threads).test(WallFollower(), 300)
+        Judge(scene, space, task, threads).test(WallFollower(), 100)
         for threads in (1, 2)
     ]
     assert tests[0] == tests[1]
-    assert tests[0].starts == 300
+    assert tests[0].starts == 100
     assert sum(tests[0].behaviour.values()) == pytest.approx(1)
     low, high = tests[0].interval
     assert tests[0].worst < low < tests[0].mean < high

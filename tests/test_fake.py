@@ -17,10 +17,10 @@ import pytest
 from epuck_mj.bridge.failures import LinkLost
 from epuck_mj.bridge.fake.__main__ import fake
 from epuck_mj.bridge.fake.emulator import Emulator
-from epuck_mj.bridge.fake.endpoints import Endpoint, Pty, Tcp, serve
+from epuck_mj.bridge.fake.endpoints import Pty, Tcp, serve
 from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import scenario
-from epuck_mj.bridge.language import ascii
+from epuck_mj.bridge.language import ascii, binary
 from epuck_mj.bridge.language.protocol import RESYNC
 from epuck_mj.bridge.language.replies import Steps
 from epuck_mj.bridge.line.link import Link
@@ -36,7 +36,7 @@ from tests.processes import PATIENCE, python_process
 
 @contextmanager
 def behind(
-    endpoint: Endpoint,
+    endpoint: Pty | Tcp,
     emulator: Emulator,
     clock: Callable[[], float] = time.monotonic,
 ) -> Iterator[Emulator]:
@@ -54,7 +54,7 @@ def behind(
 
 
 def living(
-    endpoint: Endpoint,
+    endpoint: Pty | Tcp,
     scene: Scene,
     start=(0.0, 0.0, 0.0),
     robot="asercom",
@@ -162,7 +162,7 @@ def test_the_program_in_the_document(planar, tmp_path, capsys):
         exec(script.replace("/tmp/e-puck", port.name), {})
         assert emulator.body.standing
     out = capsys.readouterr().out
-    assert re.search(r"^Version 1\.2.*\nSteps\(left=3\d\d, right=-3\d\d\) Prox", out)
+    assert re.search(r"^Version 1\.2.*\nCycle\(.*left=3\d\d, right=-3\d\d\)", out)
 
 
 def test_one_host_after_the_other(endpoint, planar):
@@ -181,7 +181,7 @@ def test_a_port_vanishes_and_returns(endpoint, planar):
         link = Link(lambda: SerialPort(name))
         try:
             link.resync(time.monotonic() + PATIENCE)
-            link.ask(ascii.drive_order(300, 300))
+            link.ask(binary.echoed_cycle_packet(300, 300, True))
             with pytest.raises(LinkLost):
                 while True:
                     link.drain(time.monotonic() + 0.02)
@@ -219,7 +219,7 @@ def test_ports_that_cannot_be_made(tmp_path):
     first = Tcp(0)
     try:
         with pytest.raises(UserError, match="cannot listen on port"):
-            Tcp(first.port)
+            Tcp(int(first.name.rpartition(":")[2]))
         with pytest.raises(UserError, match="cannot listen on port 70000"):
             Tcp(70_000)
     finally:

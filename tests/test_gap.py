@@ -19,7 +19,13 @@ from evolution.gap.__main__ import measure_gap
 from evolution.gap.gap_document import gap_document
 from evolution.gap.groups import experiments, peers
 from evolution.gap.outcomes import Outcome, abroad, ideal
-from evolution.gap.transfer import Transfer, between_robots, rank_correlations, verdict
+from evolution.gap.transfer import (
+    Gap,
+    Transfer,
+    between_robots,
+    rank_correlations,
+    verdict,
+)
 from evolution.gap.worlds import ARENAS, LATENCY_MAX, WORLD_RANGES, World, met, worlds
 from evolution.named_policies import NamedPolicy, named_policies
 from evolution.pages.blocks import to_markdown
@@ -219,7 +225,9 @@ def test_the_document_says_who_kept_what():
     names = ["a/seed-1", "a/seed-2", "b"]
     groups = {"a": [0, 1], "b": [2]}
     transfers, peers_of = {"epuck": TRANSFER}, {"0.1 m/s": [0, 1, 2]}
-    text = to_markdown(gap_document(names, transfers, groups, peers_of, 5, LATENCY))
+    text = to_markdown(
+        gap_document(Gap(names, transfers, groups, peers_of, 5, LATENCY))
+    )
     assert "3 policies, frozen, in 4 worlds" in text
     assert "| a | a/seed-1 | 0.500 |" in text
     assert "50% [15%, 85%]" in text
@@ -233,7 +241,9 @@ def test_the_document_says_who_kept_what():
     )
     both = {"epuck": more, "epuck_planar": more}
     ranked = to_markdown(
-        gap_document(list("abcde"), both, groups, {"0.1 m/s": range(5)}, 5, LATENCY)
+        gap_document(
+            Gap(list("abcde"), both, groups, {"0.1 m/s": range(5)}, 5, LATENCY)
+        )
     )
     assert "- 5 policies of 0.1 m/s, epuck: between home and a world, " in ranked
     assert "by mean fitness over the worlds, 1.00" in ranked
@@ -242,7 +252,7 @@ def test_the_document_says_who_kept_what():
     assert "| a | epuck | 2 | 84% | 68% |" in text
 
 
-def test_the_command_writes_what_it_measured(tmp_path, capsys):
+def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
     output = tmp_path / "new" / "gap"
     arguments = ["wall-follower", str(CHAMPION), "--output", str(output)]
     small = ["--worlds", "3", "--starts", "2", "--robot", "epuck_planar"]
@@ -266,6 +276,7 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys):
         assert row["arena"] == record["worlds"][int(row["world"])]["arena"]
     assert imread(output / "gap.png").shape[1] > 1000
     first = (output / "gap.json").read_bytes()
+    monkeypatch.setattr("evolution.gap.gap_folder.write_figure", lambda *_: None)
     assert measure_gap([*arguments, *small]) == 0
     assert (output / "gap.json").read_bytes() == first
 

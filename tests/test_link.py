@@ -11,7 +11,7 @@ import pytest
 from epuck_mj.bridge.failures import BridgeError, LinkLost, NoReply, RobotRestarted
 from epuck_mj.bridge.language import ascii, binary
 from epuck_mj.bridge.language.protocol import RESYNC
-from epuck_mj.bridge.language.replies import Battery, CommandedSpeeds, Version
+from epuck_mj.bridge.language.replies import Battery, Cycle, Proximity, Steps, Version
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_port import SerialPort, ports
 from epuck_mj.errors import UserError
@@ -19,6 +19,10 @@ from epuck_mj.errors import UserError
 VERSION = b"v,Version 1.2.2 August 2008 GCtronic\r\nHW version: 1.1\r\n"
 BANNER = b"\f\aWELCOME to the SerCom protocol on e-Puck\r\n"
 BARRIER = VERSION + b"e,0,0\r\n"
+
+
+CYCLE = binary.echoed_cycle_packet(300, -1, False)
+CYCLED = bytes(20) + b"\x2c\x01\xff\xff"
 
 
 class Script:
@@ -70,15 +74,15 @@ def linked(*answers) -> tuple[Link, Script]:
 
 
 def test_a_reply():
-    link, script = linked((0.05, b"e,3,-4\r\n"), (0.0, b"\x2c\x01\xff\xff"))
-    assert link.ask(ascii.speeds_query()) == CommandedSpeeds(3, -4)
-    assert link.ask(binary.speeds_packet()) == CommandedSpeeds(300, -1)
-    assert script.heard == ascii.speeds_query().out + binary.speeds_packet().out
+    link, script = linked((0.05, b"b,1\r\n"), (0.0, CYCLED))
+    assert link.ask(ascii.battery_query()) == Battery("1")
+    assert link.ask(CYCLE) == Cycle(Proximity((0,) * 8), Steps(0, 0))
+    assert script.heard == ascii.battery_query().out + CYCLE.out
     assert link.in_step
 
 
 @pytest.mark.parametrize(
-    "request_", [binary.speeds_packet(), ascii.speeds_query()], ids=["binary", "ascii"]
+    "request_", [CYCLE, ascii.battery_query()], ids=["binary", "ascii"]
 )
 @pytest.mark.parametrize("cut", [1, 20, len(BANNER) - 3])
 def test_a_banner_in_two_halves_is_a_banner(request_, cut):
@@ -108,47 +112,47 @@ def test_a_battery_that_nobody_tells():
 
 def test_no_reply_ends_in_time_and_out_of_step():
     link, script = linked()
-    with pytest.raises(NoReply, match=r"E \(commanded speeds\) in time; came nothing"):
-        link.ask(ascii.speeds_query())
+    with pytest.raises(NoReply, match=r"b \(battery\) in time; came nothing"):
+        link.ask(ascii.battery_query())
     assert script.now == pytest.approx(0.3, abs=0.02)
     assert not link.in_step
     heard = script.heard
     with pytest.raises(BridgeError, match="in step"):
-        link.ask(ascii.speeds_query())
+        link.ask(ascii.battery_query())
     assert script.heard == heard
 
 
 def test_until_is_sooner_than_patience():
-    link, script = linked((0.2, b"e,0,0\r\n"))
+    link, script = linked((0.2, b"b,1\r\n"))
     with pytest.raises(NoReply):
-        link.ask(ascii.speeds_query(), until=0.1)
+        link.ask(ascii.battery_query(), until=0.1)
     assert script.now == pytest.approx(0.1, abs=0.011)
 
 
 def test_a_lost_byte_is_not_waited_for():
     link, script = linked((0.02, b"\x2c\x01\xff"))
     with pytest.raises(NoReply, match=r"came b',\\x01\\xff'"):
-        link.ask(binary.speeds_packet())
+        link.ask(CYCLE)
     assert script.now < 0.1
 
 
 def test_leftovers_before_ascii_are_dropped_and_before_binary_they_are_not():
-    link, script = linked((0.0, b"e,1,2\r\nhello"), (0.0, b"e,3,4\r\n"))
-    link.ask(ascii.speeds_query())
-    assert link.ask(ascii.speeds_query()) == CommandedSpeeds(3, 4)
+    link, script = linked((0.0, b"b,1\r\nhello"), (0.0, b"b,0\r\n"))
+    link.ask(ascii.battery_query())
+    assert link.ask(ascii.battery_query()) == Battery("0")
     script.due = [(script.now, b"x")]
     heard = script.heard
-    with pytest.raises(BridgeError, match="silence before E"):
-        link.ask(binary.speeds_packet())
+    with pytest.raises(BridgeError, match="silence before D"):
+        link.ask(CYCLE)
     assert script.heard == heard
     assert not link.in_step
 
 
 def test_a_banner_before_a_request():
-    link, script = linked((0.0, b"e,1,2\r\n"))
+    link, script = linked((0.0, b"b,1\r\n"))
     script.due = [(0.0, BANNER)]
     with pytest.raises(RobotRestarted):
-        link.ask(ascii.speeds_query())
+        link.ask(ascii.battery_query())
     assert not link.in_step
 
 
@@ -193,11 +197,11 @@ def test_a_lost_port_is_closed_and_opened_again():
     link, script = linked((0.0, BARRIER))
     script.gone = True
     with pytest.raises(LinkLost):
-        link.ask(ascii.speeds_query())
+        link.ask(ascii.battery_query())
     assert link.lost
     assert script.closed
     with pytest.raises(LinkLost, match="one that was lost"):
-        link.ask(ascii.speeds_query())
+        link.ask(ascii.battery_query())
     script.gone = False
     link.reopen(script.now + 1)
     assert not link.lost
@@ -233,9 +237,9 @@ def test_a_pseudo_terminal():
         link.flush()
         # what was sent before is still in the line
         assert os.read(master, 100) == RESYNC.flush
-        answer = threading.Timer(0.05, os.write, (master, b"e,7,8\r\n"))
+        answer = threading.Timer(0.05, os.write, (master, b"b,7\r\n"))
         answer.start()
-        assert link.ask(ascii.speeds_query()) == CommandedSpeeds(7, 8)
+        assert link.ask(ascii.battery_query()) == Battery("7")
         answer.join()
         # a second host
         with pytest.raises(UserError, match="is busy: another program has it"):
@@ -244,7 +248,7 @@ def test_a_pseudo_terminal():
         os.close(master)
         master = slave = -1
         with pytest.raises(LinkLost, match="a robot at '/dev/"):
-            link.ask(ascii.speeds_query())
+            link.ask(ascii.battery_query())
     finally:
         link.close()
         for handle in (master, slave):

@@ -26,7 +26,7 @@ def refused(read, path, content: bytes) -> str:
         "a: !!timestamp x",
         "a: 2026-13-45",
         "a: !python/object:os.system x",
-        "[" * 5000,
+        "[" * 900,
         "? [a, b]\n: 1\n",
         "--- a\n--- b",
     ],

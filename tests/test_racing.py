@@ -1,6 +1,7 @@
 """Racing: who can only lose is broken off, and no comparison comes out differently."""
 
 from dataclasses import fields, replace
+from functools import cache
 from itertools import islice, repeat
 
 import numpy as np
@@ -229,14 +230,20 @@ def test_an_individual_that_does_not_fit_lives(monkeypatch):
 
 # evolution
 
+GENERATIONS = 8
+
 
 def small(name: str, **update) -> ExperimentConfig:
-    """A shipped experiment of 12 generations, as far as it can be made small."""
+    """A shipped experiment of few generations, as far as it can be made small."""
     config = load_config(find_config(name))
     optimizer = config.optimizer
     if "population" in {field.name for field in fields(optimizer)}:
         optimizer = replace(optimizer, **{"population": 10})
-    sizes = {"evaluations": 120, "steps": 60, "trials": 3, "optimizer": optimizer}
+    sizes = {"evaluations": 10 * GENERATIONS, "steps": 40, "trials": 3}
+    # of random search few can be broken off, and late
+    if name == "random-search":
+        sizes |= {"evaluations": 120, "steps": 60}
+    sizes |= {"validation_starts": 20, "optimizer": optimizer}
     return config.model_copy(update=sizes | update)
 
 
@@ -244,6 +251,12 @@ def evolved(config: ExperimentConfig, **how) -> Evolution:
     experiment = Evolution(config, threads=1, **how)
     list(experiment.run())
     return experiment
+
+
+@cache
+def small_one(name: str, racing: bool, fitness: str = "product") -> Evolution:
+    """`small`, evolved: to be looked at only, since tests share it."""
+    return evolved(small(name, fitness=fitness), racing=racing)
 
 
 def assert_same(a: Evolution, b: Evolution) -> None:
@@ -267,10 +280,9 @@ CASES = [
 
 @pytest.mark.parametrize(("name", "fitness"), CASES)
 def test_racing_changes_nothing_but_the_cost(name, fitness):
-    config = small(name, fitness=fitness)
-    raced, whole = (evolved(config, racing=racing) for racing in (True, False))
+    raced, whole = (small_one(name, racing, fitness) for racing in (True, False))
     assert_same(raced, whole)
-    assert len(raced.records) == 12
+    assert len(raced.records) >= GENERATIONS
     fast, slow = steps_of(raced), steps_of(whole)
     assert all(a <= b for a, b in zip(fast, slow, strict=True))
     # every fitness of the first population matters
@@ -282,7 +294,7 @@ def test_racing_changes_nothing_but_the_cost(name, fitness):
 
 @pytest.mark.parametrize("capacity", [2, 7, 29])
 def test_chunks_smaller_than_the_population_change_nothing(capacity, monkeypatch):
-    config = small("de-best", steps=30)
+    config = small("de-best", evaluations=40)
     whole = evolved(config)
     monkeypatch.setattr(evaluation, "CAPACITY", capacity)
     parts = evolved(config)
@@ -293,7 +305,7 @@ def test_chunks_smaller_than_the_population_change_nothing(capacity, monkeypatch
 
 @pytest.mark.parametrize("name", RACES[:2])
 def test_dm_control_gives_the_same_bytes_as_a_race(name):
-    config = small(name, steps=40, trials=2)
+    config = small(name, evaluations=60, trials=2)
     raced = evolved(config)
     assert_same(raced, evolved(config, engine="dm_control"))
     assert sum(steps_of(raced)) < sum(steps_of(evolved(config, racing=False)))
@@ -301,10 +313,9 @@ def test_dm_control_gives_the_same_bytes_as_a_race(name):
 
 @pytest.mark.parametrize("name", RACES[:2])
 def test_the_same_champion_is_chosen(name):
-    config = small(name, validation_starts=20)
     chosen = []
     for racing in (True, False):
-        experiment = evolved(config, racing=racing)
+        experiment = small_one(name, racing)
         chosen.append(choose_champion(experiment.engine, experiment))
     one, other = chosen
     assert one.genome.tobytes() == other.genome.tobytes()
@@ -312,7 +323,7 @@ def test_the_same_champion_is_chosen(name):
 
 
 def test_nothing_is_broken_off_where_parents_are_evaluated_again():
-    config = small("de-best", steps=40)
+    config = small("de-best")
     optimizer = replace(config.optimizer, **{"reevaluate_parents": True})
     config = config.model_copy(update={"optimizer": optimizer})
     raced, whole = (evolved(config, racing=racing) for racing in (True, False))
@@ -321,11 +332,11 @@ def test_nothing_is_broken_off_where_parents_are_evaluated_again():
 
 
 def test_a_race_can_be_begun_and_given_up_on_the_way():
-    config = small("de-rand", steps=40)
-    whole = evolved(config)
+    whole = small_one("de-rand", racing=True)
+    config = whole.config
     for first in (True, False):
         begun = Evolution(config, threads=1, racing=first)
-        list(islice(begun.run(), 5))
+        list(islice(begun.run(), 4))
         resumed = Evolution(config, threads=1, racing=not first)
         resumed.restore(begun.state())
         list(resumed.run())

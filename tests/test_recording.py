@@ -22,7 +22,7 @@ from epuck_mj.show.colors import TRIALS
 from epuck_mj.show.recording import Trial, save_recording
 from epuck_mj.show.recording.entities import entities
 from epuck_mj.step.control import TaskParameters
-from epuck_mj.trials.phases import PHASES, phases
+from epuck_mj.trials.phases import phases
 from epuck_mj.trials.recorder import record
 from tests.processes import PATIENCE
 
@@ -293,7 +293,7 @@ def test_the_lane_holds_the_phases(scene, tmp_path):
     # nothing begins twice
     assert all(a != b for a, b in itertools.pairwise(states))
     (values,) = contents.column(lane, "StateConfiguration:values", static=True)
-    assert values == list(PHASES)
+    assert values == ["searching", "following", "cornering", "crashed"]
 
 
 def test_the_lane_ends_with_the_crash(one, trajectory):
@@ -328,7 +328,7 @@ def test_rays_are_as_long_as_what_they_measured(one, trajectory):
     assert (radius[:, :, 1] >= radius[:, :, 0] - 1e-6).all()
 
 
-@pytest.mark.parametrize(("trials", "limit"), [(1, 1_000_000), (10, 10_000_000)])
+@pytest.mark.parametrize(("trials", "limit"), [(1, 1_000_000), (4, 4_000_000)])
 def test_recordings_of_whole_trials_are_small(scene, tmp_path, trials, limit):
     task = TaskParameters()
     genomes = np.random.default_rng(0).uniform(-5, 5, (50, Network().n_genes))

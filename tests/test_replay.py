@@ -18,7 +18,6 @@ from epuck_mj.step.control import TaskParameters
 from epuck_mj.trials.recorder import record
 from epuck_mj.trials.trajectory import Trajectory
 from evolution.judging.held_out_starts import (
-    N_TEST,
     held_out_disturbances,
     starts_for_test,
     starts_for_validation,
@@ -134,7 +133,7 @@ def test_a_champion_is_shown_as_it_evolved_unless_asked_otherwise(champion, here
     assert "noise" not in ideal.summary.split("##")[0]
     # the trial is that of the held-out test of all starts
     config = ExperimentConfig.parsed(fields, "test")
-    met = held_out_disturbances(config.conditions, Purpose.TEST, N_TEST, STEPS)
+    met = held_out_disturbances(config.conditions, Purpose.TEST, 1000, STEPS)
     assert met is not None
     scene = load_scene("epuck", "arena", config.control_step)
     start = starts_for_test(FreeSpace(scene, 0.01), 1)[0]

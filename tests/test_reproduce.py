@@ -1,5 +1,6 @@
 """`evolution.reproduce`: study, report and claims by one command, and again."""
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,9 @@ from epuck_mj.errors import UserError
 from evolution.reproduce import __main__ as module
 from evolution.reproduce.__main__ import reproduce_paper
 from evolution.reproduce.verdicts import OTHER_STUDY
+from evolution.run import results
+from evolution.run.means import Means
+from evolution.study.jobs import Event, Job, carry_out
 
 TINY = """
 experiments: [ga.yaml, de-best.yaml]
@@ -32,11 +36,26 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
+def carry_out_here(patch: pytest.MonkeyPatch) -> None:
+    """Have studies do their runs in this process, without pictures."""
+
+    def here(jobs: Sequence[Job], means: Means, n_processes: int) -> Iterator[Event]:
+        for job in jobs:
+            carry_out(job, means, lambda evaluations: None)
+            yield Event(job, ended=True)
+
+    patch.setattr(results, "_draw_fitness", lambda *_: None)
+    patch.setattr(results, "_show", lambda *_: None)
+    patch.setattr("evolution.study.__main__.carry_out_side_by_side", here)
+
+
 @pytest.mark.slow
 def test_one_command_runs_reports_and_judges_and_goes_on(here, monkeypatch, capfd):
     # what figures show is for their own tests
     monkeypatch.setattr("evolution.report.figures.drawn_figures", lambda data: iter(()))
-    assert reproduce_paper(["--quick", "--output", "out"]) == 0
+    with monkeypatch.context() as patch:
+        carry_out_here(patch)
+        assert reproduce_paper(["--quick", "--output", "out"]) == 0
     first = (here / "out" / "REPRODUCTION.md").read_text()
     assert "python -m evolution.reproduce --quick --output out" in first
     # it is another study than the paper's, and says so
@@ -52,7 +71,8 @@ def test_one_command_runs_reports_and_judges_and_goes_on(here, monkeypatch, capf
     assert reproduce_paper(["--quick", "--output", "out"]) == 0
     assert [path.stat().st_mtime_ns for path in runs] == before
     assert (here / "out" / "REPRODUCTION.md").read_text() == first
-    # a run that cannot be done, somebody's own files are there, stops nothing else
+    # in processes, as ever: a run that cannot be done, somebody's own files are there,
+    # stops nothing else
     thesis = here / "out" / "tiny" / "ga" / "seed-2" / "thesis.tex"
     for path in thesis.parent.iterdir():
         path.unlink()

@@ -315,22 +315,26 @@ def test_a_slow_line_is_an_overrun_and_no_step_is_shorter(planar):
 @pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
 @pytest.mark.parametrize("build", BUILDS)
 def test_the_loop_is_the_simulations(robot, build):
-    """60 s: the emulated robot goes where the simulation goes, at the same times."""
+    """The emulated robot goes where the simulation goes, at the same times.
+
+    For a minute with wheels and the commonest build, for 20 s with the others.
+    """
+    n_steps = 600 if (robot, build) == ("epuck", "asercom") else 200
     scene = load_scene(robot, "arena")
     start = np.array([0.1, -0.2, 0.7])
     world = World(scene, start, robot=build)
-    world.drive(600)
+    world.drive(n_steps)
     journal = world.body.journal
     assert world.robot.schedule.n_overruns == 0
     assert not any(journal.contact)
     timer = BUILDS[build].timer
     simulated = same_times(scene, WallFollower(), TASK, start, journal, timer)
     moved, turned = deviation(simulated, np.array(journal.pose)[: len(simulated)])
-    assert len(simulated) > 600 * scene.n_substeps
+    assert len(simulated) > n_steps * scene.n_substeps
     assert moved < 1e-3
     assert turned < math.radians(1)
     # it went somewhere, and odometry knows roughly where
-    assert world.robot.odometry.length > 4
+    assert world.robot.odometry.length > 4 * n_steps / 600
     assert np.hypot(*(world.robot.odometry.pose - world.body.pose)[:2]) < 0.2
 
 
@@ -338,11 +342,11 @@ def test_the_loop_is_the_plain_simulations_on_the_plane(planar):
     """Where sensors are never older than a physics step, times make no difference."""
     start = np.array([0.1, -0.2, 0.7])
     world = World(planar, start)
-    world.drive(600)
-    poses = at_control_steps(planar, world.body.journal, 600)
-    plain = nominal(planar, WallFollower(), TASK, start, 600)[: len(poses)]
+    world.drive(200)
+    poses = at_control_steps(planar, world.body.journal, 200)
+    plain = nominal(planar, WallFollower(), TASK, start, 200)[: len(poses)]
     moved, turned = deviation(plain, poses)
-    assert len(poses) == 601
+    assert len(poses) == 201
     assert moved < 1e-3
     assert turned < math.radians(1)
 
@@ -566,7 +570,9 @@ def test_the_first_cause_is_not_lost():
 
 # faults at random
 
-N_SCENARIOS = 100
+N_SCENARIOS = 45
+"""Five for each build and latency."""
+
 END = 4.0
 
 

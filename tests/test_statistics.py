@@ -87,8 +87,8 @@ def test_holm_raises_p_values_and_keeps_their_order(p):
 @pytest.mark.slow
 def test_holm_keeps_the_family_wise_error():
     """Three algorithms that do not differ, each against each: at most 5 % err."""
-    # values, then pairs, of 4,000 studies with 20 runs each
-    runs = rng().normal(size=(4000, 3, 20))
+    # values, then pairs, of 2,000 studies with 20 runs each
+    runs = rng().normal(size=(2000, 3, 20))
     pairs = [(0, 1), (0, 2), (1, 2)]
     p = np.column_stack(
         [
@@ -101,8 +101,8 @@ def test_holm_keeps_the_family_wise_error():
     np.testing.assert_allclose(p[:50], ours, rtol=1e-12)
     errors = [(holm(row) < 0.05).any() for row in p]
     raw = (p < 0.05).any(axis=1)
-    # the standard error of 5 % is 0.34 %
-    assert np.mean(errors) < 0.05 + 2 * 0.0034
+    # the standard error of 5 % is 0.49 %
+    assert np.mean(errors) < 0.05 + 2 * 0.0049
     assert raw.mean() > 0.08
 
 
@@ -150,10 +150,10 @@ def test_a12_of_a_batch():
 
 
 def covered(draw, true: float, n: int, m: int) -> float:
-    """Share of 10,000 studies in which the interval holds the true A12."""
-    a, b = draw((10_000, n), (10_000, m), true, rng(n + m))
-    halves = zip(np.split(a, 10), np.split(b, 10), strict=True)
-    values = np.concatenate([a12(*half) for half in halves])
+    """Share of 4,000 studies in which the interval holds the true A12."""
+    a, b = draw((4000, n), (4000, m), true, rng(n + m))
+    parts = zip(np.split(a, 4), np.split(b, 4), strict=True)
+    values = np.concatenate([a12(*part) for part in parts])
     # bounds depend on the value alone
     _, first, study = np.unique(values, return_index=True, return_inverse=True)
     intervals = [a12_interval(a[i], b[i]) for i in first]
@@ -177,7 +177,7 @@ def skewed(a, b, true, rng):
     ("n", "m"), [(10, 10), (20, 20), (30, 30), (20, 30), (30, 20), (20, 10)]
 )
 def test_a12_intervals_hold_the_truth(draw, true, n, m):
-    # the standard error is 0.2 %; towards 1 the steps of A12 are coarse
+    # the standard error is 0.3 %; towards 1 the steps of A12 are coarse
     most = 0.97 if true < 0.8 else 0.98
     assert 0.93 <= covered(draw, true, n, m) <= most
 
@@ -225,13 +225,14 @@ def test_intervals_of_median_differences_hold_the_truth(n, skew):
     generator = rng(n)
     draw = generator.exponential if skew else generator.normal
     truth, hits = math.log(2) if skew else 0.0, 0
-    for _ in range(400):
+    n_studies = 200
+    for _ in range(n_studies):
         # the medians differ by two
         a, b = 2 + draw(size=n) - truth, draw(size=n) - truth
         interval = median_difference(a, b, generator)
         hits += interval.low <= 2 <= interval.high
-    # the standard error of 95 % is 1.1 %
-    assert 0.92 <= hits / 400 <= 0.99
+    # the standard error of 95 % is 1.5 %
+    assert 0.91 <= hits / n_studies <= 0.99
 
 
 def test_few_runs_have_no_interval():
@@ -244,11 +245,11 @@ def test_few_runs_have_no_interval():
 
 def test_mean_interval_holds_the_truth():
     held = 0
-    for seed in range(400):
+    for seed in range(200):
         interval = mean_interval(rng(seed).normal(5, 2, 30), rng(seed + 1000))
         held += interval.low <= 5 <= interval.high
-    # the bootstrap is a little too sure of 30 values; the standard error is 1.1 %
-    assert 0.90 <= held / 400 <= 0.98
+    # the bootstrap is a little too sure of 30 values; the standard error is 1.5 %
+    assert 0.89 <= held / 200 <= 0.98
 
 
 def test_mean_interval_of_many_trials_is_that_of_the_normal_distribution():

@@ -47,31 +47,43 @@ SEEDS = (1, 2)
 RUNS = [(name, seed) for seed in SEEDS for name in EXPERIMENTS]
 REPRODUCED = ("history.csv", "champion.json")
 
-LONG = 300
-"""Evaluations of runs that there is time to interrupt, in 30 generations."""
+LONG = 60
+"""Evaluations of runs that are interrupted, in 6 generations."""
 
-UNHURRIED = """
-import math, time
+QUICK = """
 from epuck_mj.host.command_line import main
-from evolution.run import execution, results, directory as run_directory
 from evolution.study import __main__ as study
-from tests.processes import python_process
 
-# in the processes of the runs as well, which import this file
-save = run_directory.RunDirectory.save
+# in the processes of the runs, which import this file
+if __name__ != "__main__":
+    from evolution.run import results
 
-def saved(self, *arguments):
-    save(self, *arguments)
-    time.sleep(0.05)
+    results._draw_fitness = results._show = lambda *_: None
+"""
+HALTING = """
+    import math, time
+    from pathlib import Path
+    from evolution.run import execution
+    from evolution.run.directory import RunDirectory
 
-results._draw_fitness = results._show = lambda *_: None
-execution.SAVING_SHARE = math.inf
-run_directory.RunDirectory.save = saved
+    save = RunDirectory.save
 
+    def saved(self, evolution, seconds):
+        save(self, evolution, seconds)
+        while len(evolution.records) > 2 and not Path("go").exists():
+            time.sleep(0.01)
+
+    execution.SAVING_SHARE = math.inf
+    RunDirectory.save = saved
+else:
+    study._measure_yardstick = lambda *_: None
+"""
+"""Every generation is saved, and from the third on a file is awaited."""
+
+MAIN = """
 if __name__ == "__main__":
     main(study.study)
 """
-"""`evolution.study` that saves every generation and leaves time to look at it."""
 
 
 @pytest.fixture
@@ -88,11 +100,12 @@ def write_study(folder: Path, evaluations: int = 20) -> None:
     (folder / "mine.yaml").write_text(
         f"experiments: [one.yaml, two.yaml]\ncommon: {{evaluations: {evaluations}}}\n"
     )
-    (folder / "unhurried.py").write_text(UNHURRIED)
+    (folder / "quick.py").write_text(QUICK + MAIN)
+    (folder / "halting.py").write_text(QUICK + HALTING + MAIN)
 
 
 def make_quick(patch: pytest.MonkeyPatch) -> None:
-    """As in `UNHURRIED`, but without waiting."""
+    """As in `QUICK`."""
     patch.setattr(results, "_draw_fitness", lambda *_: None)
     patch.setattr(results, "_show", lambda *_: None)
 
@@ -136,14 +149,18 @@ class Carried:
             yield Event(job, ended=True)
 
 
+def carry_out_here(patch: pytest.MonkeyPatch) -> Carried:
+    """No processes, pictures, or yardstick."""
+    make_quick(patch)
+    carried = Carried()
+    patch.setattr(module, "carry_out_side_by_side", carried)
+    patch.setattr(module, "_measure_yardstick", lambda *_: None)
+    return carried
+
+
 @pytest.fixture
 def carried(monkeypatch) -> Carried:
-    """No processes, pictures, or long tests."""
-    make_quick(monkeypatch)
-    carried = Carried()
-    monkeypatch.setattr(module, "carry_out_side_by_side", carried)
-    monkeypatch.setattr(module, "_measure_yardstick", lambda *_: None)
-    return carried
+    return carry_out_here(monkeypatch)
 
 
 # processes
@@ -176,14 +193,23 @@ def run_processes(pid: int) -> list[int]:
     return [int(each) for each in children if "spawn_main" in command_line(int(each))]
 
 
-@pytest.fixture
-def finished(here, carried, capsys):
-    """A study of which all is done."""
-    assert study(["mine.yaml", "--seeds", "1-2", "--output", "out"]) == 0
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """The folder of a study of which all is done."""
+    cwd = tmp_path_factory.mktemp("done")
+    write_study(cwd)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(cwd)
+        carried = carry_out_here(patch)
+        assert study(["mine.yaml", "--seeds", "1-2", "--output", "out"]) == 0
     assert [(job.name, job.config.seed) for job in carried.jobs] == RUNS
-    carried.jobs.clear()
-    capsys.readouterr()
-    return here / "out"
+    return cwd / "out"
+
+
+@pytest.fixture
+def finished(here, done, carried):
+    """A copy of it beside the study's files."""
+    return shutil.copytree(done, here / "out")
 
 
 def unfinish(directory: Path) -> None:
@@ -211,17 +237,19 @@ def reference(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_every_run_is_the_same_as_alone(here, monkeypatch):
+def test_every_run_is_the_same_as_alone(here, done, monkeypatch):
     argv = ["mine.yaml", "--seeds", "1-2", "--output", "out", "--jobs", "2"]
-    process = finish(here, "unhurried.py", *argv)
+    process = finish(here, "quick.py", *argv)
     assert (process.returncode, process.stderr) == (0, "")
     make_quick(monkeypatch)
     out = here / "out"
     for name, seed in RUNS:
-        alone = here / f"{name}-{seed}"
-        argv = [f"{name}.yaml", "--seed", str(seed), "--output", str(alone)]
-        assert evolve(argv) == 0
-        there = out / name / f"seed-{seed}"
+        alone, there = (each / name / f"seed-{seed}" for each in (done, out))
+        # of each experiment one by the command for a single run
+        if (name, seed) in (("one", 1), ("two", 2)):
+            alone = here / "alone" / name
+            argv = [f"{name}.yaml", "--seed", str(seed), "--output", str(alone)]
+            assert evolve(argv) == 0
         assert_reproduced(there, alone)
         assert load_config(there / "config.yaml") == load_config(alone / "config.yaml")
         assert provenance(there)["finished"]
@@ -363,8 +391,9 @@ def test_a_run_that_fails_does_not_stop_the_others(finished, here):
     damaged.write_bytes(damaged.read_bytes()[:-100])
     shutil.rmtree(finished / "two" / "seed-2")
     before = written(other) | written(damaged.parent)
-    argv = ["mine.yaml", "--seeds", "1-2", "--output", "out", "--jobs", "2"]
-    process = finish(here, "unhurried.py", *argv)
+    (here / "go").touch()
+    argv = ["mine.yaml", "--seeds", "1-2", "--output", "out", "--jobs", "1"]
+    process = finish(here, "halting.py", *argv)
     assert process.returncode == 1
     *failures, summary = process.stderr.splitlines()
     failed = {line.split(" failed: ")[0]: line for line in failures}
@@ -400,9 +429,7 @@ def test_what_is_nobodys_to_put_right_leaves_a_log(here):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("killed", [False, True])
-def test_a_worker_does_one_run_after_the_other(here, monkeypatch, killed):
-    write_study(here)
+def test_a_worker_does_one_run_after_the_other(here, monkeypatch):
     workers: list[Any] = []
     worker = jobs._Worker
     monkeypatch.setattr(
@@ -412,21 +439,21 @@ def test_a_worker_does_one_run_after_the_other(here, monkeypatch, killed):
     config = load_config(here / "one.yaml").model_copy(update={"arena": "nowhere"})
     todo = [
         Job("one", config.model_copy(update={"seed": s}), here / f"{s}", ())
-        for s in (1, 2, 3)
+        for s in (1, 2, 3, 4)
     ]
     failures = []
     for event in jobs.carry_out_side_by_side(todo, Means(threads=1), 1):
         assert event.ended
         assert event.failure is not None
         failures.append(event.failure)
-        if killed and len(failures) == 1:
+        if len(failures) == 2:
+            assert len(workers) == 1
             # while it has nothing to do
             workers[0].process.kill()
             workers[0].process.join()
     ours, death = "no arena 'nowhere'", "its process was killed by SIGKILL"
-    expected = (ours, death if killed else ours, ours)
-    assert all(map(str.startswith, failures, expected))
-    assert len(workers) == 1 + killed
+    assert all(map(str.startswith, failures, (ours, ours, death, ours)))
+    assert len(workers) == 2
     assert all(each.process.exitcode is not None for each in workers)
 
 
@@ -438,10 +465,11 @@ def test_a_run_killed_alone_is_reported_and_the_next_call_completes_it(
     write_study(here, evaluations=LONG)
     argv = ["mine.yaml", "--experiments", "one", "--seeds", "1-2", "--output", "out"]
     one, two = (here / "out" / "one" / f"seed-{seed}" for seed in SEEDS)
-    with python_process("unhurried.py", *argv, "--jobs", "1", cwd=here) as process:
+    with python_process("halting.py", *argv, "--jobs", "1", cwd=here) as process:
         wait_for(lambda: n_records(one) > 2)
         (victim,) = run_processes(process.pid)
         os.kill(victim, signal.SIGKILL)
+        (here / "go").touch()
         stdout, stderr = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     assert stderr.splitlines() == [
@@ -465,15 +493,20 @@ def test_a_run_killed_alone_is_reported_and_the_next_call_completes_it(
 
 @contextmanager
 def interrupted(
-    here: Path, seeds: Sequence[int]
+    here: Path, seeds: Sequence[int], begun: bool = True
 ) -> Iterator[tuple[subprocess.Popen[str], list[int], list[str]]]:
-    """A study in the midst of its runs, their processes, and what was typed."""
+    """A study in the midst of its runs, their processes, and what was typed.
+
+    Unless they have `begun`, the processes may be about to load what they need.
+    """
     write_study(here, evaluations=LONG)
     argv = ["mine.yaml", "--experiments", "one", "--output", "out"]
     argv += ["--seeds", ",".join(map(str, seeds)), "--jobs", "2"]
     directories = [here / "out" / "one" / f"seed-{seed}" for seed in seeds]
-    with python_process("unhurried.py", *argv, cwd=here) as process:
-        wait_for(lambda: all(n_records(each) > 1 for each in directories))
+    with python_process("halting.py", *argv, cwd=here) as process:
+        wait_for(lambda: len(run_processes(process.pid)) == len(seeds))
+        if begun:
+            wait_for(lambda: all(n_records(each) > 2 for each in directories))
         children = run_processes(process.pid)
         assert len(children) == len(seeds)
         yield process, children, argv
@@ -494,19 +527,19 @@ def assert_completed(
 @linux
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("signum", "send", "status", "seeds"),
+    ("signum", "send", "status", "seeds", "begun"),
     [
         # a terminal sends it to all of them
-        (signal.SIGINT, os.killpg, 130, (1, 2)),
-        (signal.SIGINT, os.kill, 130, (1,)),
-        (signal.SIGTERM, os.kill, 143, (2,)),
+        (signal.SIGINT, os.killpg, 130, (1, 2), True),
+        (signal.SIGINT, os.kill, 130, (1,), False),
+        (signal.SIGTERM, os.kill, 143, (2,), True),
     ],
     ids=["Ctrl-C", "SIGINT", "SIGTERM"],
 )
 def test_a_signal_ends_all_and_says_how_to_go_on(
-    signum, send, status, seeds, here, carried, reference
+    signum, send, status, seeds, begun, here, carried, reference
 ):
-    with interrupted(here, seeds) as (process, children, typed):
+    with interrupted(here, seeds, begun) as (process, children, typed):
         send(process.pid, signum)
         stdout, stderr = process.communicate(timeout=PATIENCE)
         assert not any(map(command_line, children))
@@ -517,19 +550,20 @@ def test_a_signal_ends_all_and_says_how_to_go_on(
     python, *arguments = shlex.split(match[1])
     assert Path(python).name.startswith("python")
     assert arguments == ["-m", "evolution.study", *typed]
-    assert_completed(here, typed, seeds, reference)
+    if begun:
+        assert_completed(here, typed, seeds, reference)
 
 
 @linux
 @pytest.mark.slow
 def test_runs_end_when_their_study_is_killed(here, carried, reference):
-    with interrupted(here, SEEDS) as (process, children, typed):
+    with interrupted(here, (1,)) as (process, children, typed):
         process.kill()
         wait_for(lambda: not any(map(command_line, children)))
         _, stderr = process.communicate(timeout=PATIENCE)
     assert process.returncode == -signal.SIGKILL
     assert stderr == ""
-    assert_completed(here, typed, SEEDS, reference)
+    assert_completed(here, typed, (1,), reference)
 
 
 # one process in a directory
@@ -605,7 +639,9 @@ def test_checkpoints_take_a_small_share_of_the_time(here, carried, monkeypatch):
             saves.append((len(evolution.records), list(seconds)))
             now += 2
 
-    config = load_config(here / "one.yaml").model_copy(update={"evaluations": 1000})
+    config = load_config(here / "one.yaml").model_copy(
+        update={"evaluations": 1000, "steps": 1, "trials": 1}
+    )
     evolution = execution.Run(config, Directory(here / "run"), Means(), ())
     monkeypatch.setattr(execution, "time", Clock)
     evaluate = evolution.evolution.engine.run

@@ -15,8 +15,8 @@ from epuck_mj.step.control import TaskParameters, run_trials
 from epuck_mj.step.sensors import proximity
 from epuck_mj.trials.recorder import record, record_tracks, record_trajectories
 
-TASK = TaskParameters(steps=80)
-N = 12
+TASK = TaskParameters(steps=60)
+N = 8
 
 
 @pytest.fixture(scope="module")

@@ -142,10 +142,14 @@ def run(*arguments, **environment):
     )
 
 
-def test_bad_input_and_no_display_are_one_line_and_status_2(champion):
+def test_no_display_is_one_line_and_status_2(champion):
+    result = run("arena", champion, "--pose", 0, 0, 90)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert re.fullmatch(r"error: cannot open a window[^\n]*\n", result.stderr)
+
+
+def test_bad_input_is_one_line(champion, capsys):
     for arguments, message in [
-        (("arena",), "cannot open a window"),
-        (("arena", champion, "--pose", 0, 0, 90), "cannot open a window"),
         (("moon",), "no arena 'moon'"),
         (("arena", "none.json"), "cannot read"),
         (("arena", champion, "--robot", "r2d2"), "no robot 'r2d2'"),
@@ -153,11 +157,11 @@ def test_bad_input_and_no_display_are_one_line_and_status_2(champion):
         (("arena", "--seconds", 0), "--seconds"),
         (("arena", "--seconds", "inf"), "--seconds"),
     ]:
-        result = run(*arguments)
-        assert result.returncode == 2
-        assert result.stdout == ""
-        assert re.fullmatch(r"error: [^\n]*\n", result.stderr), result.stderr
-        assert message in result.stderr
+        with pytest.raises(UserError) as error:
+            view.view([str(argument) for argument in arguments])
+        assert "\n" not in str(error.value)
+        assert message in str(error.value)
+        assert capsys.readouterr() == ("", "")
 
 
 def test_starts_are_those_asked_for():
@@ -213,7 +217,7 @@ def closing(model, data):
         window.sync = counted
         yield window
 windows.open_window = __import__("contextlib").contextmanager(closing)
-main(view.run)
+main(view.view)
 """
 
 

@@ -55,11 +55,7 @@ class Options:
 
 
 def bridge(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status.
-
-    Raises:
-        UserError: for anything the user can put right.
-    """
+    """Run the command line; its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv)
     if options.list_ports:
         for name, description in ports():

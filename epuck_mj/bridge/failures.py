@@ -10,22 +10,12 @@ Beside 2 for what a user can put right before it starts, and 128 + signal.
 
 
 class BridgeError(UserError):
-    """An unexpected reply of the robot, or an invalid request to it.
-
-    Attributes:
-        expected: what should have come.
-        came: what came instead.
-    """
+    """An unexpected reply of the robot, or an invalid request to it."""
 
     def __init__(self, expected: str, came: str | bytes) -> None:
         """Store what was expected and what came; long bytes are shortened."""
-        super().__init__(expected, came)
-        self.expected = expected
-        self.came = came if isinstance(came, str) else _shown(came)
-
-    def __str__(self) -> str:
-        """What was expected and what came, on one line."""
-        return f"expected {self.expected}; came {self.came}"
+        text = came if isinstance(came, str) else _shown(came)
+        super().__init__(f"expected {expected}; came {text}")
 
 
 class RobotRestarted(BridgeError):

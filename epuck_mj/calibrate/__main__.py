@@ -44,9 +44,6 @@ def calibrate(argv: Sequence[str], ask: Callable[[str], str] = input) -> int:
     Args:
         argv: what was typed.
         ask: shows a question and gives the answer.
-
-    Raises:
-        UserError: for anything the user can put right.
     """
     options = parse(Options, f"python -m {MODULE}", argv)
     if not options.port:

@@ -173,10 +173,7 @@ def _turned(robot: RealRobot, calibration: Calibration) -> float:
 
 
 def _drive(
-    robot: RealRobot,
-    rates: tuple[int, int],
-    made: Callable[[], float],
-    steps: float,
+    robot: RealRobot, rates: tuple[int, int], made: Callable[[], float], steps: float
 ) -> None:
     """Drive until so many steps are made, then stand.
 

@@ -48,7 +48,7 @@ MISSES = (-360.0, 360.0)
 
 
 class Person:
-    """Person at the robot, who reads instructions and types answers."""
+    """Person at the robot; UserError says that the input has ended."""
 
     def __init__(self, ask: Callable[[str], str], interruption: Interruption) -> None:
         """Start without a question asked.
@@ -61,19 +61,11 @@ class Person:
         self._interruption = interruption
 
     def ready(self, what: str) -> None:
-        """Ask for something to be done and wait for Enter.
-
-        Raises:
-            UserError: if the input has ended.
-        """
+        """Ask for something to be done and wait for Enter."""
         self._answer(f"{what}\nThen press Enter: ")
 
     def agrees(self, question: str) -> bool:
-        """Ask until the answer is yes or no; whether it is yes.
-
-        Raises:
-            UserError: if the input has ended.
-        """
+        """Ask until the answer is yes or no; whether it is yes."""
         while True:
             answer = self._answer(f"{question} [y/n]: ").lower()
             if answer in ("y", "yes", "n", "no"):
@@ -81,11 +73,7 @@ class Person:
             _say(f"expected y or n, got '{answer}'")
 
     def number(self, question: str, low: float, high: float) -> float:
-        """Ask until the answer is a number within limits; that number.
-
-        Raises:
-            UserError: if the input has ended.
-        """
+        """Ask until the answer is a number within limits; that number."""
         while True:
             answer = self._answer(f"{question}: ")
             try:

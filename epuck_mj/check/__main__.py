@@ -30,11 +30,7 @@ class Options:
 
 
 def check(argv: Sequence[str]) -> int:
-    """Check an arena and print the findings; the exit status.
-
-    Raises:
-        UserError: if there is no arena to look at, or no place for the picture.
-    """
+    """Check an arena and print the findings; the exit status."""
     options = parse(Options, "python -m epuck_mj.check", argv)
     # physics and pictures are for a command that makes sense
     from epuck_mj.check import report

@@ -146,20 +146,17 @@ def _wall(
         return [warning(TOPIC, text, place)]
     findings = _mesh(model, geom, place)
     if not seen_by_rays(model)[geom]:
-        text = "rays cannot see it: alpha 0"
+        why = "alpha 0"
         material = model.geom_matid[geom]
         if material >= 0:
-            text += f" of material '{model.material(material).name}'"
-        findings.append(error(TOPIC, text, place))
+            why += f" of material '{model.material(material).name}'"
     elif high < heights.rays[0]:
-        text = f"rays cannot see it: it ends at {_mm(high)}"
-        text += f", rays run at {_mm(heights.rays[0])}"
-        findings.append(error(TOPIC, text, place))
+        why = f"it ends at {_mm(high)}, rays run at {_mm(heights.rays[0])}"
     elif low > heights.rays[1]:
-        text = f"rays cannot see it: it begins at {_mm(low)}"
-        text += f", rays run at {_mm(heights.rays[1])}"
-        findings.append(error(TOPIC, text, place))
-    return findings
+        why = f"it begins at {_mm(low)}, rays run at {_mm(heights.rays[1])}"
+    else:
+        return findings
+    return [*findings, error(TOPIC, f"rays cannot see it: {why}", place)]
 
 
 def _below(high: float, place: Place, heights: Heights) -> list[Finding]:

@@ -18,10 +18,7 @@ Options = TypeVar("Options")
 
 
 def parse(
-    kind: type[Options],
-    prog: str,
-    argv: Sequence[str],
-    default: Options | None = None,
+    kind: type[Options], prog: str, argv: Sequence[str], default: Options | None = None
 ) -> Options:
     """Parse `argv` into options whose flags are the fields of `kind`.
 
@@ -84,7 +81,10 @@ EXTRAS = (
 
 
 def main(run: Callable[[Sequence[str]], int]) -> None:
-    """Run a command line and leave the process with its exit status."""
+    """Run a command line and leave the process with its exit status.
+
+    Each may raise `UserError`, for anything the user can put right.
+    """
     try:
         status = run(sys.argv[1:])
     except UserError as error:

@@ -30,6 +30,8 @@ from epuck_mj.scene.robot_parts import (
 )
 from epuck_mj.step.sensors import Reading
 
+_OBJECT, _SENSOR = mujoco.mjtObj, mujoco.mjtSensor
+
 Measure = TypeVar("Measure", bound=Callable[..., Any])
 
 
@@ -135,31 +137,20 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
     """
     robot_path, arena_path = find_robot(robot), find_arena(arena)
     model, sha256 = compiled(arena_path, robot_path)
-    return _index(model, robot_path, arena_path, sha256, control_step)
-
-
-def _index(
-    model: mujoco.MjModel,
-    robot: Path,
-    arena: Path,
-    sha256: Mapping[str, str],
-    control_step: float,
-) -> Scene:
-    """The scene of a compiled model that has all of the robot's parts."""
-    check_base(model, robot)
-    index_of(model, mujoco.mjtObj.mjOBJ_GEOM, SHELL, robot)
-    check_floor(model, arena)
+    check_base(model, robot_path)
+    index_of(model, _OBJECT.mjOBJ_GEOM, SHELL, robot_path)
+    check_floor(model, arena_path)
     wheels = [
-        index_of(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name, robot) for name in WHEELS
+        index_of(model, _OBJECT.mjOBJ_ACTUATOR, name, robot_path) for name in WHEELS
     ]
     distance = [
-        sensor_address(model, name, mujoco.mjtSensor.mjSENS_RANGEFINDER, robot)
+        sensor_address(model, name, _SENSOR.mjSENS_RANGEFINDER, robot_path)
         for name in PROXIMITY
     ]
-    contact = sensor_address(model, SHELL, mujoco.mjtSensor.mjSENS_CONTACT, robot)
+    contact = sensor_address(model, SHELL, _SENSOR.mjSENS_CONTACT, robot_path)
     if model.opt.timestep <= 0:
         raise UserError(
-            f"arena '{arena}': expected a physics step above 0 s, "
+            f"arena '{arena_path}': expected a physics step above 0 s, "
             f"got {model.opt.timestep:g} s"
         )
     ratio = control_step / model.opt.timestep
@@ -173,8 +164,8 @@ def _index(
         model,
         n_substeps,
         np.array(wheels),
-        robot,
-        arena,
+        robot_path,
+        arena_path,
         sha256,
         np.array(distance),
         contact,

@@ -5,13 +5,8 @@ import numpy as np
 from epuck_mj.constants import PROXIMITY_RANGE
 from epuck_mj.trials.trajectory import Trajectory
 
-SEARCHING, FOLLOWING, CORNERING, CRASHED = (
-    "searching",
-    "following",
-    "cornering",
-    "crashed",
-)
-PHASES = (SEARCHING, FOLLOWING, CORNERING, CRASHED)
+SEARCHING, FOLLOWING = "searching", "following"
+CORNERING, CRASHED = "cornering", "crashed"
 """Names of the phases: away from walls; near one; near one and turning; crashed."""
 
 CORNERING_TIME = 1.0
@@ -25,7 +20,7 @@ At full speed, a wall of less than a quarter of a metre radius.
 
 
 def phases(trajectory: Trajectory, clearance: np.ndarray) -> np.ndarray:
-    """Phase of each sensed row, `(T + 1,)`, one of PHASES.
+    """Phase of each sensed row, `(T + 1,)`.
 
     Args:
         trajectory: what happened.

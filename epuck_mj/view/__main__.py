@@ -50,11 +50,7 @@ class Options:
 
 
 def view(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status.
-
-    Raises:
-        UserError: for anything a user can put right.
-    """
+    """Run the command line; its exit status."""
     options = parse(Options, "python -m epuck_mj.view", argv)
     policy: Policy = WallFollower()
     task = TaskParameters()

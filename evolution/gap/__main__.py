@@ -10,7 +10,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import check_threads, main, parse
 from epuck_mj.host.files import check_writable, writing
 from epuck_mj.scene.model_files import PLANAR_ROBOT, WHEELED_ROBOT
-from evolution.named_policies import named_policies
+from evolution.named_policies import policies_of
 
 NUMBER_MAX = 1000
 """Most worlds, and most starts in each."""
@@ -38,23 +38,13 @@ class GapOptions:
 
 
 def measure_gap(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status.
-
-    Raises:
-        UserError: for anything the user can put right.
-    """
+    """Run the command line; its exit status."""
     options = parse(GapOptions, "python -m evolution.gap", argv)
     for name, value in (("worlds", options.worlds), ("starts", options.starts)):
         if not 2 <= value <= NUMBER_MAX:
             raise UserError(f"expected 2 to {NUMBER_MAX} {name}, got {value}")
     check_threads(options.threads)
-    if not options.paths:
-        raise UserError(
-            "expected run or study directories, controller files, or wall-follower"
-        )
-    policies = [
-        found for path in dict.fromkeys(options.paths) for found in named_policies(path)
-    ]
+    policies = policies_of(dict.fromkeys(options.paths))
     robots = [options.robot] if options.robot else [PLANAR_ROBOT, WHEELED_ROBOT]
     with writing():
         options.output.mkdir(parents=True, exist_ok=True)

@@ -1,13 +1,11 @@
 """Figure of the gap: in how many worlds policies keep how much fitness."""
 
-from collections.abc import Mapping
-
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
 from epuck_mj.show.colors import TRIALS, fraction
-from evolution.gap.transfer import SHARE_KEPT, Transfer
+from evolution.gap.transfer import SHARE_KEPT, Gap
 from evolution.pages.style import PAGE, PRINT
 from evolution.pages.words import robot_name
 
@@ -17,20 +15,13 @@ SHARE_END = 1.2
 """End of the axis of shares, which may exceed 1."""
 
 
-def kept_figure(
-    transfers: Mapping[str, Transfer], groups: Mapping[str, list[int]]
-) -> Figure:
-    """Figure with a panel per robot and a line per group of policies.
-
-    Args:
-        transfers: by robot.
-        groups: indices of the policies of each group.
-    """
+def kept_figure(gap: Gap) -> Figure:
+    """Figure with a panel per robot and a line per experiment."""
     with matplotlib.rc_context(PRINT):
         figure = Figure(figsize=(PAGE, 2.9), layout="constrained")
-        panels = figure.subplots(1, len(transfers), sharey=True, squeeze=False)[0]
-        for axes, (robot, transfer) in zip(panels, transfers.items(), strict=True):
-            for i, (group, members) in enumerate(groups.items()):
+        panels = figure.subplots(1, len(gap.transfers), sharey=True, squeeze=False)[0]
+        for axes, (robot, transfer) in zip(panels, gap.transfers.items(), strict=True):
+            for i, (group, members) in enumerate(gap.groups.items()):
                 share = np.sort(transfer.share[:, members].ravel())
                 at_least = 1 - np.arange(share.size + 1) / share.size
                 axes.step(
@@ -53,6 +44,6 @@ def kept_figure(
         figure.legend(
             *panels[0].get_legend_handles_labels(),
             loc="outside lower center",
-            ncols=min(4, len(groups)),
+            ncols=min(4, len(gap.groups)),
         )
     return figure

@@ -1,13 +1,11 @@
 """Document about the gap: a table per robot, and rank correlations."""
 
-from collections.abc import Mapping, Sequence
-
 import numpy as np
 
 from evolution.gap.transfer import (
     COLLISIONS_MAX,
     SHARE_KEPT,
-    Transfer,
+    Gap,
     Verdict,
     between_robots,
     rank_correlations,
@@ -25,22 +23,12 @@ GROUP_COLUMNS = (
 )
 
 
-def gap_summary(
-    transfers: Mapping[str, Transfer],
-    groups: Mapping[str, Sequence[int]],
-    peers: Mapping[str, Sequence[int]],
-) -> Table:
-    """Table with a row per experiment and robot: medians of its policies' means.
-
-    Args:
-        transfers: by robot.
-        groups: indices of the policies of each experiment.
-        peers: indices of the policies of each speed.
-    """
+def gap_summary(gap: Gap) -> Table:
+    """Table with a row per experiment and robot: medians of its policies' means."""
     rows = []
-    for group, members in groups.items():
-        speed = ", ".join(s for s, each in peers.items() if set(each) & set(members))
-        for robot, transfer in transfers.items():
+    for group, members in gap.groups.items():
+        speeds = [s for s, each in gap.peers.items() if set(each) & set(members)]
+        for robot, transfer in gap.transfers.items():
             share, collisions, mastered, against_home = (
                 float(np.median(values[:, members].mean(axis=0)))
                 for values in (
@@ -53,7 +41,13 @@ def gap_summary(
             home = float(np.median(transfer.home[members]))
             rows.append(
                 [
-                    *(group, speed, robot, str(len(members)), f"{home:.3f}"),
+                    *(
+                        group,
+                        ", ".join(speeds),
+                        robot,
+                        str(len(members)),
+                        f"{home:.3f}",
+                    ),
                     *(f"{share:.0%}", f"{collisions:.1f}"),
                     *(f"{mastered:.0%}", f"{against_home:.0%}"),
                 ]
@@ -61,63 +55,35 @@ def gap_summary(
     return Table(GROUP_COLUMNS, rows, texts=3)
 
 
-def by_latency(
-    transfers: Mapping[str, Transfer],
-    groups: Mapping[str, Sequence[int]],
-    latency: np.ndarray,
-) -> Table:
-    """Table of mean shares kept by latency, with a row per experiment and robot.
-
-    Args:
-        transfers: by robot.
-        groups: indices of the policies of each experiment.
-        latency: of each world, in control steps, `(w,)`.
-    """
-    late = np.unique(latency)
-    rows = [
-        [
-            *(group, robot, str(len(members))),
-            *(f"{transfer.share[latency == n][:, members].mean():.0%}" for n in late),
-        ]
-        for group, members in groups.items()
-        for robot, transfer in transfers.items()
-    ]
+def by_latency(gap: Gap) -> Table:
+    """Table of mean shares kept by latency, with a row per experiment and robot."""
+    late = np.unique(gap.latency)
+    rows = []
+    for group, members in gap.groups.items():
+        for robot, transfer in gap.transfers.items():
+            kept = [transfer.share[gap.latency == n][:, members].mean() for n in late]
+            shares = (f"{share:.0%}" for share in kept)
+            rows.append([group, robot, str(len(members)), *shares])
     return Table(("experiment", "robot", "n", *map(str, late)), rows, texts=2)
 
 
-def gap_document(
-    names: Sequence[str],
-    transfers: Mapping[str, Transfer],
-    groups: Mapping[str, Sequence[int]],
-    peers: Mapping[str, Sequence[int]],
-    starts: int,
-    latency: np.ndarray,
-) -> list[Block]:
-    """Blocks of the document about the gap.
-
-    Args:
-        names: of the policies.
-        transfers: by robot, at least one.
-        groups: indices of the policies of each experiment.
-        peers: indices of the policies of each speed.
-        starts: of each world, and at home.
-        latency: of each world, in control steps, `(w,)`.
-    """
-    n_worlds = len(next(iter(transfers.values())).fitness)
+def gap_document(gap: Gap) -> list[Block]:
+    """Blocks of the document about the gap."""
     blocks: list[Block] = [
         Heading("The reality gap", 1),
         Paragraph(
-            f"{len(names)} policies, frozen, in {n_worlds} worlds of a Latin "
-            f"hypercube, on the first {starts} test starts. Home: the arena they "
-            "evolved in, ideal sensors and motors, as many starts. A world is mastered "
-            f"with at least {SHARE_KEPT:.0%} of the fitness kept and fewer than "
-            f"{COLLISIONS_MAX:g} collision per minute. Kept is the share of fitness at "
-            "home, or of an ideal robot's in that world's arena if that is more: "
-            "walls are found sooner in a smaller arena. Against home: mastered if "
-            "the fitness at home is all that counts. In brackets, 95 % intervals over "
-            "the worlds; they leave out the starts, which are the same in every world."
+            f"{len(gap.names)} policies, frozen, in {gap.latency.size} worlds of a "
+            f"Latin hypercube, on the first {gap.starts} test starts. Home: the arena "
+            "they evolved in, ideal sensors and motors, as many starts. A world is "
+            f"mastered with at least {SHARE_KEPT:.0%} of the fitness kept and fewer "
+            f"than {COLLISIONS_MAX:g} collision per minute. Kept is the share of "
+            "fitness at home, or of an ideal robot's in that world's arena if that is "
+            "more: walls are found sooner in a smaller arena. Against home: mastered "
+            "if the fitness at home is all that counts. In brackets, 95 % intervals "
+            "over the worlds; they leave out the starts, which are the same in every "
+            "world."
         ),
-        gap_summary(transfers, groups, peers),
+        gap_summary(gap),
         Paragraph(
             "Medians over the policies of an experiment, of their means. Randomised "
             "robots of evolution and worlds share the ranges of wheel radius, track, "
@@ -128,25 +94,23 @@ def gap_document(
             "Kept in the worlds where commands reach the wheels so many control steps "
             "late, mean over worlds and policies."
         ),
-        by_latency(transfers, groups, latency),
+        by_latency(gap),
     ]
-    for robot, transfer in transfers.items():
+    for robot, transfer in gap.transfers.items():
         rows = [
-            [group, names[i], *_cells(verdict(transfer, i))]
-            for group, members in groups.items()
+            [group, gap.names[i], *_cells(verdict(transfer, i))]
+            for group, members in gap.groups.items()
             for i in members
         ]
         blocks += [Heading(robot), Table(COLUMNS, rows, texts=2)]
-    return [*blocks, *_ranks(transfers, peers)]
+    return [*blocks, *_ranks(gap)]
 
 
-def _ranks(
-    transfers: Mapping[str, Transfer], peers: Mapping[str, Sequence[int]]
-) -> list[Block]:
+def _ranks(gap: Gap) -> list[Block]:
     """Rank correlations in words; no block if there are too few policies."""
     items = []
-    for speed, members in peers.items():
-        for robot, transfer in transfers.items():
+    for speed, members in gap.peers.items():
+        for robot, transfer in gap.transfers.items():
             found = rank_correlations(transfer, members)
             if found is not None:
                 items.append(
@@ -154,8 +118,8 @@ def _ranks(
                     f"world, mean over the worlds, {found['home']:.2f}; between two "
                     f"worlds, mean over all pairs, {found['worlds']:.2f}"
                 )
-        if len(transfers) == 2:
-            one, other = transfers.values()
+        if len(gap.transfers) == 2:
+            one, other = gap.transfers.values()
             agreed = between_robots(one, other, members)
             if agreed is not None:
                 items.append(

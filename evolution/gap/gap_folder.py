@@ -14,7 +14,7 @@ from evolution.gap.figure import kept_figure
 from evolution.gap.gap_document import gap_document, gap_summary
 from evolution.gap.groups import experiments, peers
 from evolution.gap.outcomes import Outcome, abroad, ideal
-from evolution.gap.transfer import Transfer, verdict
+from evolution.gap.transfer import Gap, Transfer, verdict
 from evolution.gap.worlds import World, worlds
 from evolution.named_policies import NamedPolicy
 from evolution.pages.blocks import to_markdown
@@ -84,7 +84,14 @@ def _write(
     starts: int,
 ) -> None:
     transfers = {robot: Transfer.of(*outcomes) for robot, outcomes in measured.items()}
-    groups = experiments(policies)
+    gap = Gap(
+        names=[policy.name for policy in policies],
+        transfers=transfers,
+        groups=experiments(policies),
+        peers=peers(policies),
+        starts=starts,
+        latency=np.array([place.latency for place in places]),
+    )
     record = {
         "worlds": [asdict(world) for world in places],
         "starts": starts,
@@ -103,14 +110,9 @@ def _write(
     with writing():
         write_text(folder / "gap.json", json.dumps(record, indent=1) + "\n")
         write_text(folder / "gap.csv", _rows(policies, places, transfers))
-        names = [policy.name for policy in policies]
-        latency = np.array([place.latency for place in places])
-        alike = peers(policies)
-        blocks = gap_document(names, transfers, groups, alike, starts, latency)
-        write_text(folder / "gap.md", to_markdown(blocks))
-        table = to_markdown([gap_summary(transfers, groups, alike)])
-        write_text(folder / "summary.md", table)
-    write_figure(kept_figure(transfers, groups), folder, "gap")
+        write_text(folder / "gap.md", to_markdown(gap_document(gap)))
+        write_text(folder / "summary.md", to_markdown([gap_summary(gap)]))
+    write_figure(kept_figure(gap), folder, "gap")
 
 
 def _rows(

@@ -1,6 +1,6 @@
 """Transfer of champions: shares kept, collisions and ranks, with uncertainties."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,6 +78,27 @@ class Transfer:
 
     def _mastered(self, share: np.ndarray) -> np.ndarray:
         return (share >= SHARE_KEPT) & (self.collisions < COLLISIONS_MAX)
+
+
+@dataclass(frozen=True, eq=False)
+class Gap:
+    """Policies in the same worlds on each robot.
+
+    Attributes:
+        names: of the policies.
+        transfers: by robot, at least one.
+        groups: indices of the policies of each experiment.
+        peers: indices of the policies of each speed.
+        starts: of each world, and at home.
+        latency: of each world, in control steps, `(w,)`.
+    """
+
+    names: Sequence[str]
+    transfers: Mapping[str, Transfer]
+    groups: Mapping[str, Sequence[int]]
+    peers: Mapping[str, Sequence[int]]
+    starts: int
+    latency: np.ndarray
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.disturbances import Disturbances
+from evolution.settings.config_fields import N_TEST, N_VALIDATION
 from evolution.settings.randomness import Purpose, disturbances, random_generator
 
 if TYPE_CHECKING:
@@ -16,14 +17,6 @@ if TYPE_CHECKING:
 
 HELD_OUT_SEED = 0
 """Seed of validation and test starts, whose streams no run uses."""
-
-N_VALIDATION = 200
-"""Default number of starts on which a champion is chosen."""
-
-N_TEST = 1000
-"""Default number of starts on which a champion is tested."""
-
-STARTS_MAX = 100_000
 
 
 def starts_for_validation(space: "FreeSpace", n: int = N_VALIDATION) -> np.ndarray:

@@ -10,11 +10,7 @@ MODULE = "evolution.replay"
 
 
 def replay(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status.
-
-    Raises:
-        UserError: for anything the user can put right.
-    """
+    """Run the command line; its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv)
     paths = [path for path in (options.path, *options.compare) if path]
     if not paths:

@@ -4,7 +4,6 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
@@ -15,14 +14,13 @@ from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.disturbances import Disturbances
 from evolution.judging.held_out_starts import (
-    N_TEST,
-    N_VALIDATION,
     held_out_disturbances,
     starts_for_test,
     starts_for_validation,
 )
 from evolution.named_policies import NamedPolicy
 from evolution.replay.options import Options
+from evolution.settings.config_fields import N_TEST, N_VALIDATION
 from evolution.settings.randomness import Purpose
 
 
@@ -41,16 +39,6 @@ class Starts:
     poses: np.ndarray
     purpose: Purpose = Purpose.TEST
     first: int = 0
-
-    @classmethod
-    def none(cls) -> Self:
-        """Make no starts, for recorded trajectories."""
-        return cls((), np.zeros((0, 3)))
-
-    @classmethod
-    def from_pose(cls, pose: np.ndarray) -> Self:
-        """Make a start of a pose `(3,)`, with the disturbances of test start 0."""
-        return cls(("pose",), pose[None])
 
     def met(self, conditions: Conditions, steps: int) -> Disturbances | None:
         """Disturbances of trials from these starts, as in the held-out test."""
@@ -129,12 +117,14 @@ def starts_for(
                 "expected --pose with x [m], y [m] and heading [degrees], got "
                 + " ".join(f"{number:g}" for number in options.pose)
             )
-        return Starts.from_pose(_pose(scene, *options.pose))
+        # it meets what test start 0 does
+        return Starts(("pose",), _pose(scene, *options.pose)[None])
     trials = 1 if options.trials is None else options.trials
     if trials < 1:
         raise UserError(f"expected at least 1 trial, got {trials}")
     if not policies:
-        return Starts.none()
+        # recorded trajectories have none
+        return Starts((), np.zeros((0, 3)))
     # the widest: a start that is free for one is free for all
     clearance = max(policy.start_clearance for policy in policies)
     spec = options.starts or f"test:0-{trials - 1}"

@@ -123,11 +123,7 @@ def _until(attempt: Callable[[], Value | None]) -> Value:
 
 
 def picture_viewer(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status.
-
-    Raises:
-        UserError: if the viewer does not work, or the file cannot be written.
-    """
+    """Run the command line; its exit status."""
     options = parse(
         ViewerPictureOptions, "python -m evolution.replay.viewer_picture", argv
     )

@@ -29,11 +29,7 @@ class ReportOptions:
 
 
 def report_study(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status.
-
-    Raises:
-        UserError: for anything the user can put right.
-    """
+    """Run the command line; its exit status."""
     options = parse(ReportOptions, "python -m evolution.report", argv)
     # slow to import
     from evolution.report.report_folder import write_report

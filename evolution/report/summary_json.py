@@ -25,7 +25,6 @@ from evolution.report.sections.cost_of_targets import target_rows
 from evolution.report.sections.how_to_get_every_number_again import commands, origins
 from evolution.report.sections.success import success_rows
 from evolution.settings.comparison import differences, flat
-from evolution.settings.config import ExperimentConfig
 from evolution.statistics.estimates import quartiles, rank_correlation
 from evolution.study.data import StudyData
 
@@ -46,7 +45,10 @@ def summary_fields(data: StudyData, output: str, ioh: bool) -> dict[str, Any]:
             "missing": list(data.missing),
             "experiments": {name: _experiment(data, name) for name in data.configs},
             "config_differences": differences(data.configs, ("seed",)),
-            "configs": {name: _keys(config) for name, config in data.configs.items()},
+            "configs": {
+                name: {key: each for key, each in flat(config).items() if key != "seed"}
+                for name, config in data.configs.items()
+            },
             "yardstick": {
                 robot: test.to_dict() for robot, test in data.yardstick.items()
             },
@@ -102,10 +104,6 @@ def _experiment(data: StudyData, name: str) -> dict[str, Any]:
         ),
         "rank_correlation_between_robots": rank if first != last else None,
     }
-
-
-def _keys(config: ExperimentConfig) -> dict[str, Any]:
-    return {key: value for key, value in flat(config).items() if key != "seed"}
 
 
 def _described(sample: np.ndarray) -> dict[str, float] | None:

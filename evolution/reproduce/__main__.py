@@ -43,11 +43,7 @@ class ReproduceOptions:
 
 
 def reproduce_paper(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status.
-
-    Raises:
-        UserError: for anything the user can put right.
-    """
+    """Run the command line; its exit status."""
     options = parse(ReproduceOptions, "python -m evolution.reproduce", argv)
     if [options.quick, options.full, options.study is not None].count(True) > 1:
         raise UserError("expected one of --quick, --full and --study")

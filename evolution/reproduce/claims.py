@@ -1,8 +1,9 @@
 """The paper's claims tested on a study: our number, its interval, n, a verdict."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from evolution.reproduce.verdicts import (
     of_order,
 )
 from evolution.settings.comparison import differences
+from evolution.settings.config import ExperimentConfig
 from evolution.study.config import StudyConfig, find_study
 from evolution.study.data import StudyData
 
@@ -91,10 +93,15 @@ def held_out_order(study: StudyData, robot: str) -> list[Claim]:
     return _of_the_paper(study, found)
 
 
+@cache
+def _shipped() -> Mapping[str, ExperimentConfig]:
+    """The shipped experiments of the paper's study."""
+    return StudyConfig.load(find_study(PAPER)).experiments
+
+
 def unlike(study: StudyData) -> list[str]:
     """Differences of experiments from the paper's except robots, a line each."""
-    shipped = StudyConfig.load(find_study(PAPER)).experiments
-    lines = []
+    shipped, lines = _shipped(), []
     for name in PAPERS:
         if name not in study.configs:
             continue
@@ -218,10 +225,7 @@ def _follows(study: StudyData, name: str) -> Claim:
     tests = [run.scores.held_out[WHEELED_ROBOT] for run in runs]
     sample = 100 * known([test.following for test in tests])
     return _claim(
-        text,
-        sample,
-        lambda: of_most(sample >= 100 * FOLLOWED),
-        "share of trials",
+        text, sample, lambda: of_most(sample >= 100 * FOLLOWED), "share of trials"
     )
 
 

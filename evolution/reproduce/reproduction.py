@@ -239,8 +239,5 @@ def _unevolved(found: Sequence[FirstGeneration], steps: int) -> list[Block]:
             "does. The paper's curves rise; by the printed equation there is next to "
             "nothing left to evolve."
         ),
-        Table(
-            ["fitness", "individuals", "best", "on fresh starts", "behaviour"],
-            rows,
-        ),
+        Table(["fitness", "individuals", "best", "on fresh starts", "behaviour"], rows),
     ]

@@ -25,11 +25,13 @@ from epuck_mj.scene.model_files import absolute
 from epuck_mj.step.conditions import Conditions, NoiseLevel
 from epuck_mj.step.control import START_CLEARANCE, STEPS_MAX, TaskParameters
 from epuck_mj.step.motors import Speeds
-from evolution.judging.held_out_starts import N_TEST, N_VALIDATION, STARTS_MAX
 from evolution.search.table import SearchSpace, own_parameters
 from evolution.settings.config_errors import one_line
 from evolution.settings.config_fields import (
     FEEDFORWARD,
+    N_TEST,
+    N_VALIDATION,
+    STARTS_MAX,
     CalibrationConfig,
     FitnessName,
     NetworkName,
@@ -204,7 +206,7 @@ class ExperimentConfig(BaseModel):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the config as text, because a user's classes belong to no module."""
-        return type(self).from_yaml, (self.to_yaml(), "config")
+        return ExperimentConfig.from_yaml, (self.to_yaml(), "config")
 
     def to_yaml(self) -> str:
         """The resolved config: every key, in the order above."""

@@ -12,6 +12,14 @@ from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.fitness import FORMULAS
 from evolution.search.table import ALGORITHMS, OptimizerParameters
 
+N_VALIDATION = 200
+"""Default number of starts on which a champion is chosen."""
+
+N_TEST = 1000
+"""Default number of starts on which a champion is tested."""
+
+STARTS_MAX = 100_000
+
 FEEDFORWARD = "feedforward"
 """Name of the paper's network, with the configuration's hidden neurons and biases."""
 

@@ -1,6 +1,9 @@
 """Experiments in YAML files: shipped ones and the user's own."""
 
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 
 from epuck_mj.host.files import find
 from epuck_mj.host.yaml_and_json import read_yaml
@@ -10,13 +13,15 @@ CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 DEFAULT_EXPERIMENT = "de-best"
 
 
-def shipped_with(key: str) -> dict[str, Path]:
+@cache
+def shipped_with(key: str) -> Mapping[str, Path]:
     """The shipped files by name that have this key, in the order of their names."""
     files = sorted(CONFIGS.glob("*.yaml"), key=lambda path: path.stem)
-    return {path.stem: path for path in files if key in read_yaml(path)}
+    found = {path.stem: path for path in files if key in read_yaml(path)}
+    return MappingProxyType(found)
 
 
-def shipped_experiments() -> dict[str, Path]:
+def shipped_experiments() -> Mapping[str, Path]:
     """Files of the shipped experiments by name."""
     return shipped_with("optimizer")
 

@@ -60,9 +60,7 @@ def expected_running_time(hits: np.ndarray, spent: np.ndarray) -> float:
 
 
 def expected_running_time_interval(
-    hits: np.ndarray,
-    spent: np.ndarray,
-    rng: np.random.Generator,
+    hits: np.ndarray, spent: np.ndarray, rng: np.random.Generator
 ) -> Interval:
     """The expected running time with a percentile bootstrap over runs.
 

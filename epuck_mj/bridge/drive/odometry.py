@@ -53,12 +53,8 @@ class Odometry:
         before, self._counters = self._counters or counters, counters
         # the longest time that can lie between the two looks
         elapsed, self._asked = now - self._asked, asked
-        steps = np.array(
-            [
-                wrapped(counters.left - before.left),
-                wrapped(counters.right - before.right),
-            ]
-        )
+        left, right = counters.left - before.left, counters.right - before.right
+        steps = np.array([wrapped(left), wrapped(right)])
         possible = STEP_RATE_MAX_2 * elapsed + SLACK
         if np.abs(steps).max() > possible:
             raise BridgeError(

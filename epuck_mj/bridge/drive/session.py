@@ -55,11 +55,7 @@ class Session:
     steps: list[Step] = field(default_factory=list)
 
     def drive(
-        self,
-        robot: RealRobot,
-        policy: Policy,
-        n_steps: int,
-        clock: Callable[[], float],
+        self, robot: RealRobot, policy: Policy, n_steps: int, clock: Callable[[], float]
     ) -> Iterator[Step]:
         """Yield control steps as they happen; does not stop the robot.
 

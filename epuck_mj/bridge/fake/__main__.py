@@ -59,11 +59,7 @@ class Options:
 
 
 def fake(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status.
-
-    Raises:
-        UserError: for anything the user can put right.
-    """
+    """Run the command line; its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv)
     _refuse_bad_options(options)
     # physics is not for those who only ask for help

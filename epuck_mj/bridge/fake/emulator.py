@@ -26,7 +26,6 @@ class Emulator:
 
     Attributes:
         body: in its scene.
-        restarted: when faults have reset it [s].
     """
 
     def __init__(
@@ -71,11 +70,7 @@ class Emulator:
         return not (self._there.idle and self._back.idle)
 
     def connected(self, now: float) -> bool:
-        """Whether the robot's port exists.
-
-        Args:
-            now: the time [s].
-        """
+        """Whether the robot's port exists at a time [s]."""
         return not self._lasting({"disconnect", "gone"}, now)
 
     def exchange(self, heard: bytes, now: float) -> bytes:

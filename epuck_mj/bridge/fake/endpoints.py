@@ -11,7 +11,6 @@ import socket
 import tty
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.errors import UserError
@@ -25,43 +24,12 @@ HEARD_MAX = 4096
 """Largest number of bytes received at once."""
 
 
-class Endpoint(Protocol):
-    """An endpoint that receives and sends bytes.
+class Pty:
+    """A pseudo-terminal with a name that stays the same.
 
     Attributes:
         is_open: whether a host can open it.
     """
-
-    is_open: bool
-
-    @property
-    def name(self) -> str:
-        """Name by which a host opens it."""
-        ...
-
-    def open(self) -> None:
-        """Appear."""
-        ...
-
-    def close(self) -> None:
-        """Vanish."""
-        ...
-
-    def handles(self) -> list[int]:
-        """File descriptors that bytes may arrive on."""
-        ...
-
-    def receive(self) -> bytes:
-        """The bytes that have arrived; does not wait."""
-        ...
-
-    def send(self, data: bytes) -> None:
-        """Send what the host accepts; the rest is lost, all if it is not connected."""
-        ...
-
-
-class Pty:
-    """A pseudo-terminal with a name that stays the same; see Endpoint."""
 
     def __init__(self, link: Path) -> None:
         """Appear.
@@ -81,11 +49,11 @@ class Pty:
 
     @property
     def name(self) -> str:
-        """See Endpoint."""
+        """Name by which a host opens it."""
         return str(self._link)
 
     def open(self) -> None:
-        """See Endpoint."""
+        """Appear."""
         self._master, self._slave = os.openpty()
         # nothing is echoed or changed, even before a host says so
         tty.setraw(self._slave)
@@ -98,7 +66,7 @@ class Pty:
             raise
 
     def close(self) -> None:
-        """See Endpoint."""
+        """Vanish."""
         if not self.is_open:
             return
         self.is_open = False
@@ -108,23 +76,23 @@ class Pty:
         os.close(self._slave)
 
     def handles(self) -> list[int]:
-        """See Endpoint."""
+        """File descriptors that bytes may arrive on."""
         return [self._master] if self.is_open else []
 
     def receive(self) -> bytes:
-        """See Endpoint."""
+        """The bytes that have arrived; does not wait."""
         with contextlib.suppress(BlockingIOError):
             return os.read(self._master, HEARD_MAX)
         return b""
 
     def send(self, data: bytes) -> None:
-        """See Endpoint."""
+        """Send what the host accepts; the rest is lost, all if it is not connected."""
         with contextlib.suppress(BlockingIOError):
             os.write(self._master, data)
 
 
 class Tcp:
-    """A TCP port on this computer; see Endpoint."""
+    """A TCP port on this computer, with the interface of Pty."""
 
     def __init__(self, port: int) -> None:
         """Appear.
@@ -145,16 +113,11 @@ class Tcp:
 
     @property
     def name(self) -> str:
-        """See Endpoint."""
+        """See Pty."""
         return f"socket://{LOCALHOST}:{self._port}"
 
-    @property
-    def port(self) -> int:
-        """The port's number."""
-        return self._port
-
     def open(self) -> None:
-        """See Endpoint."""
+        """See Pty."""
         self._server = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
             self._server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -169,7 +132,7 @@ class Tcp:
         self.is_open = True
 
     def close(self) -> None:
-        """See Endpoint."""
+        """See Pty."""
         if not self.is_open:
             return
         self.is_open = False
@@ -177,14 +140,14 @@ class Tcp:
         self._server.close()
 
     def handles(self) -> list[int]:
-        """See Endpoint."""
+        """See Pty."""
         if not self.is_open:
             return []
         # others wait in the queue until this one has gone
         return [(self._host or self._server).fileno()]
 
     def receive(self) -> bytes:
-        """See Endpoint."""
+        """See Pty."""
         if self._host is None:
             with contextlib.suppress(BlockingIOError):
                 self._host, _ = self._server.accept()
@@ -202,7 +165,7 @@ class Tcp:
         return data
 
     def send(self, data: bytes) -> None:
-        """See Endpoint."""
+        """See Pty."""
         if self._host is None:
             return
         try:
@@ -220,7 +183,7 @@ class Tcp:
 
 def serve(
     emulator: Emulator,
-    endpoint: Endpoint,
+    endpoint: Pty | Tcp,
     clock: Callable[[], float],
     wanted: Callable[[], bool],
 ) -> None:

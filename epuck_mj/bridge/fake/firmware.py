@@ -60,11 +60,7 @@ class Firmware(Talker):
         self.reset(now)
 
     def reset(self, now: float) -> None:
-        """Press the robot's reset button.
-
-        Args:
-            now: the time [s], never less than before.
-        """
+        """Press the robot's reset button at a time [s], never less than before."""
         self.leds: list[int] = [0] * (N_LEDS + 2)
         self._motors = Motors(self._body, self._build.timer)
         self._sensors = ProximitySensors(self._body, self._build.period, now)

@@ -176,11 +176,7 @@ class ProximitySensors:
         self._missing = CALIBRATION_SAMPLES
 
     def advance(self, now: float) -> None:
-        """Take the samples that are due.
-
-        Args:
-            now: the time [s], never less than before.
-        """
+        """Take the samples that are due at a time [s], never less than before."""
         due = int(now / self._period) - self._n_samples
         if due <= 0:
             return

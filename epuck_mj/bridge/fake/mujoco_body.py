@@ -107,11 +107,7 @@ class MujocoBody:
         return not any(wheel.rate for wheel in self.wheels)
 
     def advance(self, now: float) -> None:
-        """Simulate up to a time.
-
-        Args:
-            now: the time [s], never less than before.
-        """
+        """Simulate up to the time `now` [s], never less than before."""
         self._now = now
         while self._origin + (self._n_steps + 1) * self._timestep <= now:
             self._step()

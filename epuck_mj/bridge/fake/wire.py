@@ -54,11 +54,7 @@ class Wire:
                 self._under_way.append((self._free + self._latency, byte))
 
     def receive(self, now: float) -> bytes:
-        """The bytes that have arrived.
-
-        Args:
-            now: the time [s], never less than before.
-        """
+        """The bytes that have arrived at a time [s], never less than before."""
         arrived = bytearray()
         while self._under_way and self._under_way[0][0] <= now:
             arrived.append(self._under_way.popleft()[1])

@@ -10,97 +10,30 @@ length or checksum. What can be told of them:
 - `echoed_cycle_packet` ends in the commanded speeds, which we know: if a byte was lost
   and another one slipped in, or the robot was reset, they are not where they should be.
 
-Not recognisable: a byte changed into another within its range; in `cycle_packet`, a
-byte too many before a byte too few when counts are small. So nothing may be under way
-when a packet is sent: see `protocol.RESYNC`.
+Not recognisable: a byte changed into another within its range. So nothing may be under
+way when a packet is sent: see `protocol.RESYNC`.
 
 Source: gctronic/e-puck-library, `Asercom.c` and `BTcom.c`.
 """
 
 import struct
-from collections.abc import Callable
 
 from epuck_mj.bridge.failures import BridgeError
 from epuck_mj.bridge.language.ascii import refuse_fast_speeds
-from epuck_mj.bridge.language.parsing import BytesParser, Request, T
-from epuck_mj.bridge.language.replies import (
-    Ambient,
-    CommandedSpeeds,
-    Cycle,
-    Proximity,
-    Steps,
-)
+from epuck_mj.bridge.language.parsing import BytesParser, Request
+from epuck_mj.bridge.language.replies import Cycle, Proximity, Steps
 from epuck_mj.constants import N_PROXIMITY
-
-COUNTS = struct.Struct(f"<{N_PROXIMITY}h")
-"""Proximity or ambient light counts."""
 
 PAIR = struct.Struct("<2h")
 """Values of the left and the right wheel."""
+
+CYCLE = struct.Struct(f"<{N_PROXIMITY}h2h2h")
+"""Proximity counts, step counters and commanded speeds."""
 
 
 def letter_code(letter: str) -> bytes:
     """The byte that stands for a letter: its code, negated in two's complement."""
     return bytes([-ord(letter) & 0xFF])
-
-
-def proximity_packet() -> Request[Proximity]:
-    """N: the proximity counts."""
-    return _request("N (proximity)", letter_code("N"), COUNTS.size, _proximity)
-
-
-def ambient_packet() -> Request[Ambient]:
-    """O: the ambient light counts."""
-    return _request(
-        "O (ambient light)",
-        letter_code("O"),
-        COUNTS.size,
-        lambda data: Ambient(COUNTS.unpack(data)),
-    )
-
-
-def steps_packet() -> Request[Steps]:
-    """Q: the step counters."""
-    return _request("Q (step counters)", letter_code("Q"), PAIR.size, _steps)
-
-
-def speeds_packet() -> Request[CommandedSpeeds]:
-    """E: the speeds last commanded."""
-    return _request("E (commanded speeds)", letter_code("E"), PAIR.size, _speeds)
-
-
-def drive_packet(left: int, right: int) -> Request[CommandedSpeeds]:
-    """D, and E to have an answer: alone, D has none.
-
-    Args:
-        left: of the left motor [steps/s].
-        right: of the right motor [steps/s].
-
-    Raises:
-        BridgeError: beyond +-1000; in the reply, if other speeds come back.
-    """
-    expected = CommandedSpeeds(left, right)
-
-    def reply(data: bytes) -> CommandedSpeeds:
-        _refuse_other_speeds(expected, _speeds(data))
-        return expected
-
-    out = _drive(left, right) + letter_code("E")
-    return _request("D E (speeds)", out, PAIR.size, reply)
-
-
-def cycle_packet(left: int, right: int) -> Request[Cycle]:
-    """D, N and Q: a control step in one packet of 8 bytes, answered by 20.
-
-    Args:
-        left: of the left motor [steps/s].
-        right: of the right motor [steps/s].
-
-    Raises:
-        BridgeError: beyond +-1000.
-    """
-    out = _drive(left, right) + letter_code("N") + letter_code("Q")
-    return _request("D N Q (cycle)", out, COUNTS.size + PAIR.size, _cycle)
 
 
 def echoed_cycle_packet(left: int, right: int, changed: bool) -> Request[Cycle]:
@@ -117,49 +50,19 @@ def echoed_cycle_packet(left: int, right: int, changed: bool) -> Request[Cycle]:
     Raises:
         BridgeError: beyond +-1000; in the reply, if other speeds come back.
     """
-    expected = CommandedSpeeds(left, right)
+    refuse_fast_speeds(left, right)
 
     def reply(data: bytes) -> Cycle:
-        _refuse_other_speeds(expected, _speeds(data[-PAIR.size :]))
-        return _cycle(data[: -PAIR.size])
+        *counts, left_steps, right_steps, left_now, right_now = CYCLE.unpack(data)
+        if (left_now, right_now) != (left, right):
+            raise BridgeError(
+                f"the commanded speeds {left} and {right}",
+                f"{left_now} and {right_now}: out of step, or the robot was reset",
+            )
+        return Cycle(Proximity(tuple(counts)), Steps(left_steps, right_steps))
 
-    told = _drive(left, right)
-    asked = letter_code("N") + letter_code("Q") + letter_code("E")
+    told = letter_code("D") + PAIR.pack(left, right)
+    asked = letter_code("N") + letter_code("Q") + letter_code("E") + b"\0"
+    name = "D N Q E (checked cycle)"
     out = told + asked if changed else asked
-    length = COUNTS.size + 2 * PAIR.size
-    return _request("D N Q E (checked cycle)", out, length, reply)
-
-
-def _request(
-    name: str, out: bytes, length: int, reply: Callable[[bytes], T]
-) -> Request[T]:
-    return Request(name, out + b"\0", lambda: BytesParser(name, length, reply))
-
-
-def _drive(left: int, right: int) -> bytes:
-    refuse_fast_speeds(left, right)
-    return letter_code("D") + PAIR.pack(left, right)
-
-
-def _proximity(data: bytes) -> Proximity:
-    return Proximity(COUNTS.unpack(data))
-
-
-def _steps(data: bytes) -> Steps:
-    return Steps(*PAIR.unpack(data))
-
-
-def _speeds(data: bytes) -> CommandedSpeeds:
-    return CommandedSpeeds(*PAIR.unpack(data))
-
-
-def _cycle(data: bytes) -> Cycle:
-    return Cycle(_proximity(data[: COUNTS.size]), _steps(data[COUNTS.size :]))
-
-
-def _refuse_other_speeds(expected: CommandedSpeeds, came: CommandedSpeeds) -> None:
-    if came != expected:
-        raise BridgeError(
-            f"the commanded speeds {expected.left} and {expected.right}",
-            f"{came.left} and {came.right}: out of step, or the robot was reset",
-        )
+    return Request(name, out, lambda: BytesParser(name, CYCLE.size, reply))

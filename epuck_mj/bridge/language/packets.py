@@ -13,7 +13,7 @@ import struct
 from epuck_mj.bridge.failures import BridgeError
 from epuck_mj.bridge.language.ascii import refuse_fast_speeds
 from epuck_mj.bridge.language.binary import PAIR
-from epuck_mj.bridge.language.replies import Ambient, Proximity, Sensors, Steps
+from epuck_mj.bridge.language.replies import Proximity, Sensors, Steps
 from epuck_mj.constants import N_PROXIMITY
 
 COMMAND_BYTES = 21
@@ -22,9 +22,8 @@ COMMAND_BYTES = 21
 COMMAND = 0x80
 """First byte of a command."""
 
-STREAM_IMAGE = 0b01
 STREAM_SENSORS = 0b10
-"""Sensors to be streamed, bits of a command's byte 1."""
+"""Bit of a command's byte 1: sensors are to be streamed."""
 
 CALIBRATE = 0b001
 """Bit of a command's byte 2: the proximity sensors' offsets are measured anew."""
@@ -102,7 +101,7 @@ def sensors_in(body: bytes) -> Sensors:
     """
     return Sensors(
         Proximity(UNSIGNED_COUNTS.unpack_from(body, AT_PROXIMITY)),
-        Ambient(UNSIGNED_COUNTS.unpack_from(body, AT_AMBIENT)),
+        UNSIGNED_COUNTS.unpack_from(body, AT_AMBIENT),
         Steps(*PAIR.unpack_from(body, AT_STEPS)),
         body[AT_SELECTOR],
     )

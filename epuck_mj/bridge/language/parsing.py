@@ -8,13 +8,12 @@ or None while it needs more, or raises. It never waits: deadlines are the link's
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 from epuck_mj.bridge.failures import BridgeError, RobotRestarted
 from epuck_mj.constants import REPLY_TIME_MAX
 
 T = TypeVar("T")
-T_co = TypeVar("T_co", covariant=True)
 
 BANNER = b"WELCOME to the SerCom protocol on e-Puck"
 """Text that a robot sends after a reset only.
@@ -32,27 +31,6 @@ LINE_MAX = 256
 """Longest line [bytes]: every reply is shorter."""
 
 
-class Parser(Protocol[T_co]):
-    """Parser of a single reply."""
-
-    def feed(self, data: bytes) -> T_co | None:
-        """Add bytes; the reply once it is complete, else None.
-
-        Args:
-            data: what came, any number of bytes.
-
-        Raises:
-            BridgeError: if this cannot be the reply any more, or was complete before.
-            RobotRestarted: if the robot's banner came instead.
-        """
-        ...
-
-    @property
-    def rest(self) -> bytes:
-        """Bytes that came after the reply."""
-        ...
-
-
 @dataclass(frozen=True)
 class Request(Generic[T]):
     """A request to the robot, which can keep only one at a time.
@@ -66,7 +44,7 @@ class Request(Generic[T]):
 
     name: str
     out: bytes
-    parser: Callable[[], Parser[T]]
+    parser: Callable[[], "LinesParser[T] | BytesParser[T]"]
     patience: float = REPLY_TIME_MAX
 
 
@@ -86,12 +64,8 @@ class Line:
     what: str
 
 
-GREETING = Line(re.compile(re.escape(BANNER)), None, "the banner")
-"""The robot's banner, as a line of a reply."""
-
-
 class LinesParser(Generic[T]):
-    """Parser of an ASCII reply of given lines in a given order.
+    """Parser of one ASCII reply of given lines in a given order.
 
     Any other line is not ours and is skipped: garbage, banners' second halves, replies
     to what was given up. A line that begins as ours and is wrong raises.
@@ -117,7 +91,15 @@ class LinesParser(Generic[T]):
         return self._buffer if not self._awaited else b""
 
     def feed(self, data: bytes) -> T | None:
-        """See Parser."""
+        """Add bytes; the reply once it is complete, else None.
+
+        Args:
+            data: what came, any number of bytes.
+
+        Raises:
+            BridgeError: if this cannot be the reply any more, or was complete before.
+            RobotRestarted: if the robot's banner came instead.
+        """
         if not self._awaited:
             raise BridgeError("nothing after the reply", data)
         *lines, self._buffer = (self._buffer + data).split(b"\n")
@@ -132,7 +114,7 @@ class LinesParser(Generic[T]):
     def _take(self, line: bytes) -> None:
         awaited = self._awaited[0]
         self._refuse_long(line)
-        if BANNER in line and awaited is not GREETING:
+        if BANNER in line:
             raise RobotRestarted(awaited.what, line)
         if line.endswith(NOT_FOUND + b"\r"):
             raise BridgeError(awaited.what, line)
@@ -151,7 +133,7 @@ class LinesParser(Generic[T]):
 
 
 class BytesParser(Generic[T]):
-    """Parser of a binary reply with a fixed number of bytes.
+    """Parser of one binary reply with a fixed number of bytes.
 
     The bytes bear no mark. The caller makes sure that no other reply is under way.
     """
@@ -176,7 +158,7 @@ class BytesParser(Generic[T]):
         return b""
 
     def feed(self, data: bytes) -> T | None:
-        """See Parser."""
+        """See LinesParser."""
         if self._done:
             raise BridgeError("nothing after the reply", data)
         self._buffer += data

@@ -8,13 +8,7 @@ from epuck_mj.constants import N_PROXIMITY, N_SELECTOR, PROXIMITY_COUNT_MAX
 
 @dataclass(frozen=True)
 class Acknowledged:
-    """Reply that the robot has carried out a command.
-
-    Attributes:
-        letter: of the command, in lower case.
-    """
-
-    letter: str
+    """Reply that the robot has carried out a command."""
 
 
 @dataclass(frozen=True)
@@ -45,16 +39,6 @@ class Battery:
 
 
 @dataclass(frozen=True)
-class Calibrated:
-    """Reply that the proximity sensors' zero is set."""
-
-
-@dataclass(frozen=True)
-class Restarted:
-    """Reply that the robot was reset as asked."""
-
-
-@dataclass(frozen=True)
 class Proximity:
     """Proximity counts ps0..ps7, growing as things come near.
 
@@ -70,21 +54,6 @@ class Proximity:
 
 
 @dataclass(frozen=True)
-class Ambient:
-    """Ambient light counts of the sensors ps0..ps7, growing as it gets dark.
-
-    Attributes:
-        counts: `(8,)`, each 0 to 4095.
-    """
-
-    counts: tuple[int, ...]
-
-    def __post_init__(self) -> None:
-        """Refuse what 12 bits cannot say."""
-        _refuse_bad_counts("ambient light", self.counts)
-
-
-@dataclass(frozen=True)
 class Steps:
     """Step counters, wrapping at +-32768.
 
@@ -95,27 +64,6 @@ class Steps:
 
     left: int
     right: int
-
-    def __post_init__(self) -> None:
-        """Refuse what 16 bits cannot say."""
-        _refuse_long_words("step counters", (self.left, self.right))
-
-
-@dataclass(frozen=True)
-class CommandedSpeeds:
-    """The speeds last commanded; they are not measured.
-
-    Attributes:
-        left: of the left motor [steps/s].
-        right: of the right motor [steps/s].
-    """
-
-    left: int
-    right: int
-
-    def __post_init__(self) -> None:
-        """Refuse what 16 bits cannot say."""
-        _refuse_long_words("commanded speeds", (self.left, self.right))
 
 
 @dataclass(frozen=True)
@@ -137,18 +85,20 @@ class Sensors:
 
     Attributes:
         proximity: the proximity counts.
-        ambient: the ambient light counts.
+        ambient: light counts of the sensors ps0..ps7, growing as it gets dark, `(8,)`,
+            each 0 to 4095.
         steps: the step counters.
         selector: position of the selector, 0 to 15.
     """
 
     proximity: Proximity
-    ambient: Ambient
+    ambient: tuple[int, ...]
     steps: Steps
     selector: int
 
     def __post_init__(self) -> None:
-        """Refuse a selector position that does not exist."""
+        """Refuse light beyond 12 bits, and a selector with too many positions."""
+        _refuse_bad_counts("ambient light", self.ambient)
         if not 0 <= self.selector < N_SELECTOR:
             raise BridgeError(
                 f"a selector from 0 to {N_SELECTOR - 1}", f"{self.selector}"
@@ -162,11 +112,6 @@ def _refuse_bad_counts(name: str, counts: tuple[int, ...]) -> None:
         raise BridgeError(
             f"{N_PROXIMITY} {name} counts from 0 to {PROXIMITY_COUNT_MAX}", f"{counts}"
         )
-
-
-def _refuse_long_words(name: str, values: tuple[int, ...]) -> None:
-    if not all(-(2**15) <= value < 2**15 for value in values):
-        raise BridgeError(f"{name} of 16 bits", f"{values}")
 
 
 def wrapped(count: int) -> int:

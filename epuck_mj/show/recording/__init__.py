@@ -22,7 +22,7 @@ from epuck_mj.host.files import write_bytes, writing
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene
 from epuck_mj.show.recording.blueprint import blueprint
-from epuck_mj.show.recording.entities import APPLICATION, Entities, entities
+from epuck_mj.show.recording.entities import APPLICATION, entities
 from epuck_mj.show.recording.motion import log_motion
 from epuck_mj.show.recording.shapes import log_arena, log_robot
 from epuck_mj.show.recording.signals import log_signals
@@ -46,11 +46,7 @@ class Trial:
 
 
 def save_recording(
-    path: str | Path,
-    scene: Scene,
-    trials: Sequence[Trial],
-    title: str,
-    summary: str,
+    path: str | Path, scene: Scene, trials: Sequence[Trial], title: str, summary: str
 ) -> None:
     """Write trials as .rrd.
 
@@ -77,27 +73,17 @@ def save_recording(
             stream.log("summary", document, static=True)
             log_arena(stream, scene.model)
             for trial, place in zip(trials, places, strict=True):
-                _log_trial(stream, scene, probe, trial, place)
+                trajectory = trial.trajectory
+                log_robot(stream, scene.model, place)
+                log_motion(stream, scene, trajectory, trial.task.sensor_range, place)
+                clearance = probe.measure(trajectory.pose).distance
+                log_signals(stream, trajectory, clearance, place)
         content = file.read_bytes() if file.exists() else b""
     # rerun only warns when it is switched off
     if not content:
         raise UserError(f"cannot write '{path}': the variable RERUN switches rerun off")
     with writing():
         write_bytes(Path(path), content)
-
-
-def _log_trial(
-    stream: rr.RecordingStream,
-    scene: Scene,
-    probe: ClearanceProbe,
-    trial: Trial,
-    place: Entities,
-) -> None:
-    trajectory = trial.trajectory
-    log_robot(stream, scene.model, place)
-    log_motion(stream, scene, trajectory, trial.task.sensor_range, place)
-    clearance = probe.measure(trajectory.pose).distance
-    log_signals(stream, trajectory, clearance, place)
 
 
 def _identity(trials: Sequence[Trial]) -> str:

@@ -1,0 +1,289 @@
+"""docs/extending.md works: its parts are written, run, resumed, studied and replayed.
+
+As a reader would: from a folder of one's own, with the installed wheel.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from epuck_mj.errors import UserError
+from epuck_mj.policies.file import load_controller
+from epuck_mj.policies.topology import OwnNetwork, check_network
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.step.fitness import StepFacts, step_fitness
+from evolution.run.__main__ import evolve
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.config_files import load_config
+from tests.processes import PATIENCE
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = (ROOT / "docs" / "extending.md").read_text()
+
+SMALL = "--steps 12 --trials 2 --population 10 --evaluations 60"
+FEW = "--validation-starts 4 --test-starts 4"
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", PAGE, re.M | re.S)
+
+
+AVOIDANCE, MEMORY, CHECK_NETWORK, SWARM, CHECK_OPTIMIZER, SCRIPT = blocks("python")
+PARTS = {"avoidance.py": AVOIDANCE, "memory.py": MEMORY, "swarm.py": SWARM}
+COMMANDS = [line for block in blocks("sh") for line in block.splitlines()]
+
+DRIVER = """
+import json, runpy, sys
+
+def command(line):
+    words = line.split()
+    assert words[:2] == ["python", "-m"]
+    sys.argv = words[2:]
+    try:
+        runpy.run_module(words[2], run_name="__main__", alter_sys=True)
+    except SystemExit as end:
+        assert not end.code, (line, end.code)
+
+if __name__ == "__main__":
+    import epuck_mj
+    print("installed in", epuck_mj.__file__)
+    for line in json.loads(sys.argv.pop(1)):
+        if line.startswith("python"):
+            command(line)
+        else:
+            exec(line)
+"""
+"""Command lines and scripts, one after the other, in one process."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """A reader's folder with the page's files."""
+    folder = tmp_path_factory.mktemp("reader")
+    for name, text in PARTS.items():
+        assert f"as\n`{name}`" in PAGE or f"as `{name}`" in PAGE
+        (folder / name).write_text(text)
+    swarm, mine = blocks("yaml")
+    (folder / "swarm.yaml").write_text(swarm)
+    small = "evaluations: 150\n  steps: 5\n  trials: 1\n  validation_starts: 2"
+    small += "\n  test_starts: 2"
+    assert "evaluations: 3000" in mine
+    (folder / "mine.yaml").write_text(mine.replace("evaluations: 3000", small))
+    (folder / "driver.py").write_text(DRIVER)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory) -> Path:
+    """A folder with the packages, installed from the wheel that is built of them."""
+    built, installed = (tmp_path_factory.mktemp(name) for name in ("built", "wheel"))
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet"]
+    quick = ["--no-deps", "--no-index"]
+    build = [*pip, "wheel", *quick, "--no-build-isolation", "-w", str(built), str(ROOT)]
+    subprocess.run(build, check=True, timeout=PATIENCE)
+    (file,) = built.glob("*.whl")
+    install = [*pip, "install", *quick, "--target", str(installed), str(file)]
+    subprocess.run(install, check=True, timeout=PATIENCE)
+    return installed
+
+
+def small(command: str) -> str:
+    """The page's command with a budget that a test can afford."""
+    run = command.startswith("python -m evolution.run")
+    return f"{command} {SMALL} {FEW}" if run else command
+
+
+@pytest.mark.slow
+def test_the_page_from_another_folder_with_the_wheel(folder, wheel):
+    study, report = (line for line in COMMANDS if "mine" in line)
+    lines = [small(line) for line in COMMANDS if line not in (study, report)]
+    lines += [
+        study.replace("1-10", "1"),
+        report,
+        CHECK_NETWORK,
+        CHECK_OPTIMIZER,
+        SCRIPT,
+    ]
+    done = subprocess.run(
+        [sys.executable, "driver.py", json.dumps(lines)],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(wheel)},
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert f"installed in {wheel}" in done.stdout
+    assert "particle-swarm, seed 1: 60 evaluations in 6 generations" in done.stdout
+    assert "3 of 3 runs are finished" in done.stdout
+    assert len(re.findall(r"^best of 300: \d+\.\d, mean \d", done.stdout, re.M)) == 3
+    for name in ("avoid", "memory", "swarm"):
+        file = load_controller(folder / "runs" / name / "champion.json")
+        assert len(file.origin.own_sha256) == 1
+    assert "swarm" in (folder / "report" / "report.md").read_text()
+
+
+@pytest.fixture
+def here(folder, tmp_path, monkeypatch) -> Path:
+    """Another folder with the parts in it."""
+    for name, text in PARTS.items():
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("evolution.run.results._draw_fitness", lambda *_: None)
+    monkeypatch.setattr("evolution.run.results._show", lambda *_: None)
+    return tmp_path
+
+
+ALL_OWN = (
+    "--fitness avoidance.py:avoid --network memory.py:Elman "
+    f"--optimizer swarm.py:Swarm {SMALL} {FEW}"
+)
+
+
+def test_own_parts_change_nothing_of_what_changes_nothing(here):
+    ways = {
+        "batch": "--threads 1",
+        "alive": "--no-racing --threads 2",
+        "dm_control": "--engine dm_control",
+    }
+    for name, flags in ways.items():
+        assert evolve(f"{ALL_OWN} {flags} --output {name}".split()) == 0
+    for name in ways:
+        for file in ("history.csv", "champion.json"):
+            expected = (here / "batch" / file).read_bytes()
+            assert (here / name / file).read_bytes() == expected
+    # the config leads to the same parts from anywhere
+    config = load_config(here / "batch" / "config.yaml")
+    assert set(config.own_parts) == {
+        f"{here}/avoidance.py:avoid",
+        f"{here}/memory.py:Elman",
+        f"{here}/swarm.py:Swarm",
+    }
+    assert ExperimentConfig.from_yaml(config.to_yaml(), "text") == config
+
+
+def test_an_edited_part_is_refused_on_resume(here):
+    assert evolve(f"{ALL_OWN} --output run".split()) == 0
+    provenance = here / "run" / "provenance.json"
+    unfinished = json.loads(provenance.read_text()) | {"finished": None}
+    provenance.write_text(json.dumps(unfinished))
+    assert evolve(["--resume", "run"]) == 0
+    unfinished["own_sha256"][f"{here}/memory.py:Elman"] = "of before"
+    provenance.write_text(json.dumps(unfinished))
+    with pytest.raises(UserError, match=r"memory\.py:Elman' has been edited since"):
+        evolve(["--resume", "run"])
+
+
+def test_memories_begin_anew_and_belong_to_one_robot(here):
+    own = OwnNetwork("memory.py:Elman")
+    rng = np.random.default_rng(0)
+    genomes, seen = rng.normal(size=(4, own.n_genes)), rng.random((3, 4, 8))
+    crowd = own.decode(genomes).started(4)
+    first = [crowd(observation) for observation in seen]
+    assert not np.array_equal(crowd(seen[0]), first[0])
+    again = crowd.started(4)
+    np.testing.assert_array_equal(again(seen[0]), first[0])
+    # those who stay keep theirs
+    stay = np.array([False, True, False, True])
+    np.testing.assert_array_equal(again[stay](seen[1][stay]), first[1][stay])
+    # one controller in many robots
+    many = own.decode(genomes[1]).started(4)
+    np.testing.assert_array_equal(many(seen[0])[1], first[0][1])
+    check_network("memory.py:Elman")
+
+
+def facts(n: int = 3) -> StepFacts:
+    return StepFacts(
+        action=np.tile([1.0, 0.0], (n, 1)),
+        command=np.ones((n, 2)),
+        observation=np.ones((n, 8)),
+        distance=np.full((n, 8), -1.0),
+        contact=np.arange(n) == 0,
+        time=0.1,
+        poses=lambda: np.zeros((n, 3)),
+        clearances=lambda: np.full(n, 0.2),
+    )
+
+
+def test_an_own_fitness_says_what_a_step_is_worth(here):
+    fitness = step_fitness("avoidance.py:avoid")
+    assert fitness.maximum == 1
+    assert fitness(facts()).tolist() == [0, 1, 1]
+    assert TaskParameters(fitness="avoidance.py:avoid").step_fitness is not None
+
+
+BAD = """
+import numpy as np
+def fails(step): return step.nothing
+def flat(step): return 1.0
+def much(step): return step.time * np.full(len(step.contact), 30.0)
+much.maximum = 1.0
+def wordy(step): return 0
+wordy.maximum = "much"
+number = 3
+class Product:
+    n_genes, n_state = 16, 0
+    def act(self, genomes, observation, state):
+        weights = genomes.reshape(*genomes.shape[:-1], 2, 8)
+        out = np.tanh(weights @ observation[..., None])[..., 0]
+        return np.stack([(out[..., 0] + 1) / 2, out[..., 1]], axis=-1), state
+class Loud(Product):
+    def act(self, genomes, observation, state):
+        return 3 + observation[..., :2], state
+class Flat(Product):
+    def act(self, genomes, observation, state): return np.zeros(2), state
+class Deaf: n_genes, n_state = 16, 0
+class Countless(Product): n_genes = "many"
+class Needy:
+    def __init__(self, size): pass
+"""
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        ("--fitness nowhere.py:f", "cannot read '.*nowhere.py': No such file"),
+        ("--fitness no_module_here:f", "cannot import 'no_module_here'"),
+        ("--fitness bad.py:other", "no 'other' in '.*bad.py'; available: np, fails, "),
+        ("--fitness bad.py:", "expected file.py:name or package.module:name"),
+        ("--fitness sum", "expected product, literal or my.py:name, got 'sum'"),
+        ("--fitness bad.py:number", "expected a function, got 3"),
+        ("--fitness bad.py:wordy", "expected a number as its maximum, got 'much'"),
+        ("--fitness bad.py:fails", "failed in line 3 with AttributeError"),
+        ("--fitness bad.py:flat", r"one value a robot, shape \(20,\), got shape \(\)"),
+        ("--fitness bad.py:much", "expected at most its maximum, 1, got 3"),
+        ("--fitness broken.py:f", "'.*broken.py' failed in line 2 with SyntaxError"),
+        ("--fitness late.py:f", "'.*late.py' failed in line 1 with ZeroDivisionError"),
+        ("--network elman", "expected feedforward or my.py:name, got 'elman'"),
+        ("--network bad.py:Loud", "expected v from 0 to 1 and w from -1 to 1, got v 3"),
+        ("--network bad.py:Flat", r"expected actions of shape \(20, 2\), got \(2,\)"),
+        ("--network bad.py:Deaf", "expected a method 'act'"),
+        ("--network bad.py:Countless", "expected n_genes, a whole number from 1"),
+        ("--network bad.py:Needy", "failed .*with TypeError"),
+        ("--optimizer swarm.py:SwarmParameters", "expected a subclass of evolution"),
+        ("--optimizer swarm.py:Swarm --inertai 1", "inertai"),
+        ("--optimizer pso", "one of differential_evolution, .* or my.py:Class"),
+    ],
+)
+def test_bad_parts_are_refused_in_one_line(flags, message, here):
+    (here / "bad.py").write_text(BAD)
+    (here / "broken.py").write_text("import numpy\nf = (\n")
+    (here / "late.py").write_text("f = 1 / 0\n")
+    argv = f"ga {SMALL} {FEW} --output run {flags}".split()
+    with pytest.raises(UserError, match=message) as caught:
+        evolve(argv)
+    assert "\n" not in str(caught.value)
+    assert not (here / "run" / "champion.json").exists()
+
+
+def test_a_network_that_acts_otherwise_in_a_crowd_is_found(here):
+    crowded = "(weights + len(genomes) * 1e-3) @"
+    (here / "bad.py").write_text(BAD.replace("weights @", crowded))
+    with pytest.raises(UserError, match="acts otherwise alone than among others"):
+        check_network("bad.py:Product")
