@@ -1,7 +1,7 @@
 """Policies by name: a run, a study, a file, or wall-follower.
 
-What can be evaluated and replayed: champions, the best individuals of past generations,
-and the follower written by hand.
+Policies that can be evaluated and replayed are champions, the best individuals of
+earlier generations, and the hand-written wall follower.
 """
 
 import math

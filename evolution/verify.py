@@ -1,7 +1,7 @@
 """Test shipped champions again: `python -m evolution.verify results/paper/...`.
 
-MuJoCo gives the same bits for one version on one type of processor only. Where the
-fitness differs, what else differs is named.
+MuJoCo gives the same bits only for one version on one type of processor. Where the
+fitness differs, differing versions and processors are printed.
 """
 
 import platform

@@ -1,6 +1,6 @@
 """Fitting: sensor gains, wheel radii and track from measurements.
 
-What no e-puck has is refused: then something was measured wrongly.
+Values that no e-puck has are refused, since a measurement must be wrong.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Check of an arena: its contents and its faults.
 
-Every part looks at a scene and returns findings; only `report` makes text of them, and
+Each part examines a scene and returns findings. Only `report` makes text of them, and
 only `__main__` prints.
 """
 

@@ -1,7 +1,7 @@
 """dm_control tasks: wall following as a `dm_env` environment for agents.
 
-The suite's habit: `env = epuck_mj.load("follow_walls", {"random": 1})`. The parts
-(observe, command, step fitness) are those of batched evaluation, so that the same
+As in dm_control's suite: `env = epuck_mj.load("follow_walls", {"random": 1})`. The
+parts (observe, command, step fitness) are those of batched evaluation, so that the same
 actions give the same bits.
 """
 

@@ -1,8 +1,8 @@
 """Ctrl-C, kill and a closed terminal as one exception, raised only where allowed.
 
-What stops motors or puts files in order must not be broken off half-way, not even by
-a first signal that comes while it runs. So signals raise inside `raising` only;
-elsewhere they are noted.
+Code that stops motors or completes files must not be interrupted, not even by a first
+signal. So a signal raises an exception only inside `raising`; elsewhere it is
+remembered.
 """
 
 import signal

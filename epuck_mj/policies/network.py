@@ -1,7 +1,7 @@
 """The paper's network: sensors in, one hidden layer, speed and turn out.
 
 Sums are written out term by term instead of as a matrix product: BLAS orders a sum
-by the size of the batch, and a controller must act the same alone and in a crowd.
+by the size of the batch, and a controller must act the same alone and in a batch.
 """
 
 from dataclasses import asdict, dataclass

@@ -1,8 +1,7 @@
 """Simulated robots with the sensors and motors of real ones.
 
-Between the policy and the wheels stands the firmware, which knows whole steps per
-second only; between the walls and the policy stand sensors that count. What they count
-is put back into metres as the bridge does it on a robot.
+The firmware rounds commands to whole steps per second. The sensors count, and their
+counts are converted back into metres as the bridge does on a robot.
 """
 
 import numpy as np

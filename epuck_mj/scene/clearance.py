@@ -1,8 +1,8 @@
 """Clearance: how far the shell is from the nearest wall, by true geometry.
 
 MuJoCo's own distance between convex shapes, so any arena will do. It is measured in a
-model of its own that holds the walls and the shell and nothing else: whole scenes
-would cast the robot's rays on every pose.
+separate model with only the walls and the shell, since a whole scene would also compute
+the robot's rays for every pose.
 
 The robot stands upright on its start height, as on a flat floor. Distances are those in
 space, which beside upright walls are those in the plane.

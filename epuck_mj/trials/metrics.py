@@ -2,7 +2,7 @@
 
 A robot is near a wall if its shell has at most the proximity range to it. Shares and
 means are over the control steps lived, each with the pose at its end; NaN where there
-is nothing to take a mean of.
+are no steps to average.
 """
 
 from dataclasses import dataclass, fields

@@ -1,7 +1,7 @@
 """The recorder: trials written into arrays while they are simulated.
 
-Tracks and trajectories come from the same loop, `run_trials`, the one of evolution: on
-every rung, with or without disturbances, to the last bit what was evaluated.
+Tracks and trajectories come from `run_trials`, the loop of evolution. So on every rung,
+with or without disturbances, they are bit-identical to what was evaluated.
 """
 
 from collections.abc import Mapping

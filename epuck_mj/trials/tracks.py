@@ -1,6 +1,6 @@
 """Tracks: paths of many robots in one trial each, as plain arrays.
 
-What metrics need of a trial and no more; a `Trajectory` has all of a single one.
+Tracks hold only what metrics need; a `Trajectory` holds everything of one trial.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
 """A champion in MuJoCo's own viewer: `python -m epuck_mj.view my.xml champion.json`.
 
-It drives at real time, trial after trial on new starts, until the window is closed. A
-crash ends a trial. What the window shows is the trial itself, step by step: the same
-start gives the trajectory of `epuck_mj.trials.recorder.record`, to the last bit.
+The champion drives at real time, trial after trial on new starts, until the window is
+closed. A crash ends a trial. A trial in the window is bit-identical to the trajectory
+of `epuck_mj.trials.recorder.record` from the same start.
 """
 
 import itertools

@@ -1,6 +1,6 @@
 """Held-out evaluation: fitness and behaviour of a controller on new starts.
 
-The numbers that a study reports.
+These are the numbers that a study reports.
 """
 
 from pathlib import Path

@@ -1,7 +1,7 @@
 """Scores of champions, as in their files.
 
-Read with `read`, which refuses what is no score, and written with `to_dict`, which
-leaves out what is not known.
+`read` reads scores and refuses invalid ones. `to_dict` gives the known scores as plain
+values.
 """
 
 import math
@@ -119,14 +119,14 @@ class Scores(_Record, frozen=True):
         """Lines with held-out fitness on each robot and stored fitness, of `steps`."""
         starts = next(iter(self.held_out.values())).starts
         lines = [
-            f"Held-out fitness of {steps}, mean of {starts} fresh starts: "
+            f"Held-out fitness of {steps}, mean of {starts} new starts: "
             + _in_words(self.held_out),
-            f"Stored fitness of {steps}, what evolution believes: {self.stored:.1f}",
+            f"Stored fitness of {steps}, on the starts of evolution: {self.stored:.1f}",
         ]
         if self.held_out_as_evolved:
             disturbed = _in_words(self.held_out_as_evolved)
             lines.insert(
-                1, f"The same with the disturbances it evolved with: {disturbed}"
+                1, f"Held-out fitness with the disturbances of evolution: {disturbed}"
             )
         return "\n".join(lines)
 

@@ -1,6 +1,6 @@
 """The whole study in one command: `python -m evolution.reproduce [--quick | --full]`.
 
-Runs the study, reports it, and holds each of the paper's claims against it.
+Runs the study, reports it, and tests each of the paper's claims on it.
 """
 
 import sys

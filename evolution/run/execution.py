@@ -1,7 +1,7 @@
 """Execution of a run: evolve, save on the way, choose and test the champion.
 
-What a person's single run and a run of a study have in common. However it is carried
-out, and however often it is interrupted, the same config leaves the same bytes.
+Single runs and runs of a study use the same code. The same config gives the same bytes,
+with any threads and engine, and after any number of interruptions.
 """
 
 import time

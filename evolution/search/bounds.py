@@ -1,6 +1,6 @@
 """Bounds rules: how genes outside the bounds are moved.
 
-The paper does not say. With CR = 1 and F = 0.8 it is a common case, so it matters.
+The paper does not say what happens to them. With CR = 1 and F = 0.8 they are common.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,8 +1,9 @@
 """CMA-ES with restarts, maximising: the package `cmaes` behind ask and tell.
 
-Each start is a `cmaes.CMA` at a random mean in the initial range. When it has nothing
-left to find, or only noise, the next generation starts another one with twice the
-population. `cmaes` sees the former; the latter is `has_stagnated`. A genome
+Each search is a `cmaes.CMA` that starts at a random mean in the initial range. When it
+has converged, which `cmaes` detects, or when it only follows noise, which
+`has_stagnated` detects, the next generation starts another one with twice the
+population. A genome
 outside the bounds is drawn again up to 100 times, then clipped, by `cmaes`.
 
 A `cmaes.CMA` cannot be saved without pickle or its private attributes. But it is a

@@ -1,6 +1,6 @@
 """(1+1) evolution strategies with the one-fifth success rule, maximising.
 
-Several run side by side and never meet: each lineage is one parent with its own step
+Several run independently side by side: each lineage is one parent with its own step
 size sigma. In every generation it gets one offspring, the parent plus sigma times a
 standard normal vector, and is replaced iff that is strictly fitter. A tie keeps the
 parent and counts as a failure. Randomness is drawn in this order: the initial

@@ -1,8 +1,8 @@
 """Table of optimisers: shipped ones and a user's own.
 
-The modules behind it do not know this one: `ask_tell` has what they share,
-`search_space` the box, one module each the algorithms. The baselines beside the paper's
-are random search, (1+1)-ES and CMA-ES.
+Only this module imports all algorithms, which are one module each. They share
+`ask_tell` and `search_space`. The baselines beside the paper's are random search,
+(1+1)-ES and CMA-ES.
 
     optimizer = make_optimizer(config.optimizer, config.search_space, rng)
     while spent + optimizer.next_size() <= budget:

@@ -1,7 +1,7 @@
 """Effect sizes: by how much the runs of two algorithms differ.
 
-The unit is the run: samples are `(n,)` and `(m,)`, one value per run, finite and not
-empty, or there is a `ValueError`.
+The unit is the run: samples are `(n,)` and `(m,)`, one value per run. Empty
+samples and values that are not finite raise `ValueError`.
 """
 
 import math

@@ -1,8 +1,8 @@
 """Estimates from samples of runs: means, shares and quartiles with bounds.
 
-The unit is the run: a sample is `(n,)`, one value per run, finite and not empty, or
-there is a `ValueError`. One run has a value but no spread, and few have none that could
-be trusted: their bounds are nan. The same generator gives the same bounds.
+The unit is the run: a sample is `(n,)`, one value per run. An empty sample and values
+that are not finite raise `ValueError`. The bounds of one run, and of too few runs for a
+reliable interval, are nan. The same generator gives the same bounds.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Significance: the Mann-Whitney test, Fisher's, and Holm's adjustment of a family.
 
-The unit is the run: samples are `(n,)` and `(m,)`, one value per run, finite and not
-empty, or there is a `ValueError`.
+The unit is the run: samples are `(n,)` and `(m,)`, one value per run. Empty
+samples and values that are not finite raise `ValueError`.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
 """Jobs: the runs of a study, carried out side by side in processes of this machine.
 
-A process does one run after the other, so that MuJoCo and scipy are loaded once.
-Whatever becomes of one, memory exhausted and `kill -9` included, its run fails and the
-others go on. A process ends with the one that started it.
+A process does one run after the other, so that MuJoCo and scipy are loaded once. If a
+process dies, even by `kill -9` or for lack of memory, only its run fails and the others
+continue. A process ends with the one that started it.
 """
 
 import multiprocessing

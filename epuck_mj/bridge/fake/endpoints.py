@@ -1,7 +1,7 @@
 """Endpoints of an emulated robot: a pseudo-terminal or a TCP port, in real time.
 
-Both serve one host at a time, on this computer only, and vanish and return with the
-scenario.
+Both serve one host at a time, on this computer only. A scenario can make them vanish
+and return.
 """
 
 import contextlib

@@ -1,22 +1,21 @@
 """An emulated e-puck on a serial line: v1 with either firmware, or v2.
 
-It does what the real ones do, quirks included:
+It behaves like the real ones, oddities included:
 
 - one parser, which waits for operands for ever; no watchdog, no echo, no checksum;
-- a zero between commands is ignored; a return that ends no line makes of the next byte
-  the first one of a line, even if it is a binary command;
+- a zero between commands is ignored; after a return that ends no line, the next byte
+  begins a line, even if it is a binary command;
 - binary replies come once, after the packet's zero; a packet of D, L and P has none;
 - while it calibrates it handles no commands, and its receive ring overflows;
 - the banner comes at a reset only; a reset forgets everything;
-- speeds saturate in silence while E tells them as they came; see `motors_and_sensors`
-  for what the motors make of them.
+- speeds saturate without a message, while E reports them unsaturated; see
+  `motors_and_sensors` for the speeds of the motors.
 
-It speaks C, D, E, K, L, N, O, P, Q, R, S, V, and Asercom `b`; to the other letters it
-is a robot that doesn't know them. It opens nothing and waits for nothing: bytes and
-times are arguments.
+It knows C, D, E, K, L, N, O, P, Q, R, S, V, and Asercom `b`, and answers other letters
+as unknown. It opens no port and never waits: bytes and times are arguments.
 
-Where the code leaves room, it was decided: S makes E say 0,0; operands that are
-missing keep their last value; a full ring begins from its start and so loses all.
+The source code leaves three things open. Here, E reports 0,0 after S; missing operands
+keep their last value; a full receive ring starts again and so loses its bytes.
 
 Source: gctronic/e-puck-library, `Asercom.c`, `BTcom.c`, `e_uart1_rx_char.s`;
 e-puck2/e-puck2_main-processor, `Asercom2.c`; GCtronic's wiki, "Advanced sercom

@@ -1,7 +1,7 @@
 """Motors, sensors and body of the emulated e-puck, below its firmware.
 
-The body is anything with wheels and sensors, for instance a MuJoCo robot; here is what
-the firmware's timers make of it.
+The body is anything with wheels and sensors, for instance a robot in MuJoCo. This
+module times its motors and sensors as the firmware's timers do.
 """
 
 from dataclasses import dataclass

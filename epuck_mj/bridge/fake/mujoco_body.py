@@ -1,10 +1,10 @@
 """The emulated e-puck's body: a robot in a scene of MuJoCo.
 
-Time is cut into physics steps. A command takes effect with the next one, and what is
-sensed belongs to the last; both are noted, so that a simulation can be given the same
-times. When a robot that was told to stand is told to drive, its physics steps are
-shifted to end `LEAD` after that moment: a host that keeps a steady pace is then
-not a step early or late for being a millisecond early or late.
+Time is divided into physics steps. A command takes effect in the next step, and a
+sensor reading is that of the last step. Both are recorded, so that a simulation can be
+given the same times. When a standing robot is told to drive, its physics steps are
+shifted to end `LEAD` after that moment. Then a command of a host with a steady pace
+that comes a millisecond early or late still falls into the same physics step.
 """
 
 import math

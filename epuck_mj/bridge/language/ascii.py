@@ -1,8 +1,8 @@
 r"""The e-puck's ASCII dialect: a letter and operands, ended by one `\r`.
 
 The reply is a line: the letter in lower case, values, `\r\n`. It is recognised by its
-letter, the number of its values and their ranges, wherever it ends a line, so that
-half a line before it does no harm. A bare acknowledgement is a line of its own.
+letter, the number of its values and their ranges, at the end of any line, so that
+an incomplete line before it does no harm. An acknowledgement is a whole line.
 
 Not recognisable: a digit lost or changed, and a reply to an earlier, equal request.
 

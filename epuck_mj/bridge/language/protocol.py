@@ -1,6 +1,6 @@
 """The robot's language as a link needs it: bytes only, no I/O.
 
-A link does this, and this only:
+A link works as follows:
 
 1. one request at a time: send `request.out`, feed whatever comes to one
    `request.parser()`, for `request.patience` seconds;
@@ -15,7 +15,7 @@ An e-puck2 on a serial line speaks the same `ascii` and `binary`; over WiFi it s
 `packets`. No firmware stops when the link is lost: send `ascii.stop_order()` on every
 way out.
 
-A reply cannot name its request. That none is misread as another rests on this:
+A reply does not name its request. These rules keep one from being taken for another:
 
 - ASCII: letter, number of values, ranges. Two replies to equal requests look the same,
   so a request that was given up is followed by RESYNC, never by itself.

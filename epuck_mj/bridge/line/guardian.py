@@ -1,10 +1,10 @@
 """Guardian: a process that stops the robot if the bridge is killed.
 
-It shares the bridge's open port and says nothing, until the pipe from the bridge ends.
-If a byte came before that, the bridge is done; if not, it died, by `kill -9` or a
-crash: then the guardian sends what stops the robot, several times.
+It shares the bridge's open port and waits until the pipe from the bridge ends. If a
+byte came before that, the bridge has ended in order. If not, the bridge was killed or
+has crashed, and the guardian sends the stop message several times.
 
-Run by its path, with nothing but the standard library: it has to be there at once.
+It is run by its path and uses only the standard library, to start at once.
 """
 
 import contextlib

@@ -1,7 +1,7 @@
 """An e-puck2 on WiFi: commands go out, packets stream in, none are acknowledged.
 
-What it senses now is in the first packet that comes after one asks; packets that came
-before are old and dropped. That it stopped is seen by its step counters.
+The current reading is in the first packet that comes after it is asked for; earlier
+packets are dropped. Whether the robot has stopped is seen from its step counters.
 """
 
 import time

@@ -1,9 +1,8 @@
 """Runs of a study on a Dask cluster, with their files on this machine.
 
-Whatever happens on the way, the bytes are those of a run on this machine, if the
-processors are of one type: a task whose worker dies is done again by another, and a
-worker of other versions, code or models refuses its tasks. Only this package imports
-`distributed`, an extra.
+If the processors are of one type, the bytes are those of a run on this machine: if a
+worker dies, another one repeats its task, and a worker with other versions, code or
+models refuses its tasks. Only this package imports `distributed`, an extra.
 """
 
 from collections.abc import Iterator, Sequence
