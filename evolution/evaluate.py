@@ -5,12 +5,13 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.host.command_line import check_threads, main, parse
+from epuck_mj.host.command_line import check_threads, main, parse, word
 from epuck_mj.step.conditions import ConditionFlags, Conditions
 from epuck_mj.step.disturbances import Disturbances
 from evolution.judging.held_out_starts import held_out_disturbances
@@ -21,6 +22,12 @@ from evolution.settings.randomness import Purpose
 from evolution.settings.setting import Setting
 
 MODULE = "evolution.evaluate"
+
+
+EXAMPLES = (
+    "python -m evolution.evaluate runs/ga-seed-1 wall-follower",
+    "python -m evolution.evaluate runs/ga-seed-1 --arena round --starts 100",
+)
 
 
 @dataclass(frozen=True)
@@ -41,19 +48,19 @@ class Options:
         json: JSON file to write all results to.
     """
 
-    paths: tyro.conf.Positional[tuple[str, ...]]
-    generations: str | None = None
+    paths: tyro.conf.Positional[Annotated[tuple[str, ...], word("RUN")]]
+    generations: Annotated[str | None, word("NUMBERS")] = None
     starts: int = N_TEST
-    robot: str | None = None
-    arena: str | None = None
+    robot: Annotated[str | None, word("ROBOT")] = None
+    arena: Annotated[str | None, word("ARENA")] = None
     robots: ConditionFlags = field(default_factory=ConditionFlags)
     threads: int = 0
-    json: Path | None = None
+    json: Annotated[Path | None, word("FILE")] = None
 
 
 def evaluate_policies(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
-    options = parse(Options, f"python -m {MODULE}", argv)
+    options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     if not 2 <= options.starts <= STARTS_MAX:
         raise UserError(f"expected 2 to {STARTS_MAX} starts, got {options.starts}")
     check_threads(options.threads)

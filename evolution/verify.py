@@ -9,13 +9,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.host.command_line import check_threads, main, parse
+from epuck_mj.host.command_line import check_threads, main, parse, word
 from epuck_mj.policies.file import ControllerFile, load_controller
 from evolution.judging.held_out_starts import held_out_disturbances
 from evolution.judging.scores import Scores
@@ -31,6 +31,12 @@ if TYPE_CHECKING:
 MODULE = "evolution.verify"
 
 
+EXAMPLES = (
+    "python -m evolution.verify runs/ga-seed-1",
+    "python -m evolution.verify results/paper",
+)
+
+
 @dataclass(frozen=True)
 class Options:
     """Test the champions of finished runs again and compare with their stored scores.
@@ -42,13 +48,13 @@ class Options:
         threads: threads that step the robots; 0 is one per core. Changes no result.
     """
 
-    paths: tyro.conf.Positional[tuple[Path, ...]]
+    paths: tyro.conf.Positional[Annotated[tuple[Path, ...], word("RUN")]]
     threads: int = 0
 
 
 def verify(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
-    options = parse(Options, f"python -m {MODULE}", argv)
+    options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     check_threads(options.threads)
     runs = [run for path in options.paths for run in _runs(path)]
     if not runs:

@@ -299,7 +299,7 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
     assert found["epuck"] == test
     assert test.mean != scores.held_out["epuck"].mean
     _, disturbed, _ = scores.in_lines(60).splitlines()
-    assert disturbed.startswith("Held-out fitness with the disturbances of evolution: ")
+    assert disturbed.startswith("The same with the disturbances it evolved with: ")
     # and shown so: the recorded trial is the first of that test
     judge, shown = judges_of(config)["epuck"], Trajectory.load(directory.trajectory)
     start, policy = judge.starts(1)[0], stored.controller
@@ -321,11 +321,11 @@ def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
         mean, crashes = test["mean"], test["crash_rate"]
         parts.append(f"{robot} {mean:.1f} ({crashes:.0%} crash)")
     assert fresh == (
-        "Held-out fitness of 20, mean of 30 new starts: " + ", ".join(parts)
+        "Held-out fitness of 20, mean of 30 fresh starts: " + ", ".join(parts)
     )
     stored_fitness = stored["stored"]
     assert believed == (
-        f"Stored fitness of 20, on the starts of evolution: {stored_fitness:.1f}"
+        f"Stored fitness of 20, what evolution believes: {stored_fitness:.1f}"
     )
 
 

@@ -294,7 +294,7 @@ def test_the_summary_is_in_plain_words(finished):
     assert re.fullmatch(
         r"ga, seed 7: 60 evaluations in 6 generations, \d+ min \d+ s", first
     )
-    assert fresh.startswith("Held-out fitness of 20, mean of 5 new starts: ")
+    assert fresh.startswith("Held-out fitness of 20, mean of 5 fresh starts: ")
     for robot in ("epuck_planar", "epuck"):
         report = scores["held_out"][robot]
         mean, crashes = report["mean"], report["crash_rate"]
@@ -421,7 +421,7 @@ def test_a_run_on_an_own_robot_of_another_name(here, no_pictures, capsys):
     # an empty directory is as good as none
     assert evolve(["ga", *SHORT, "--robot", "mine.xml", "--output", "out"]) == 0
     out = capsys.readouterr().out
-    assert "new starts: mine.xml " in out
+    assert "fresh starts: mine.xml " in out
     assert "crash), epuck " in out
     origin = load_controller("out/champion.json").origin
     assert origin.robot == str(here / "mine.xml")

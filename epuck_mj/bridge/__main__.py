@@ -5,6 +5,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 
@@ -12,7 +13,7 @@ from epuck_mj.bridge.line.connect import connect
 from epuck_mj.bridge.line.serial_port import ports
 from epuck_mj.constants import SPEED_MAX
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import main, parse
+from epuck_mj.host.command_line import main, parse, word
 from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
 from epuck_mj.step.calibration import Calibration
@@ -20,6 +21,12 @@ from epuck_mj.step.control import Policy, TaskParameters
 
 MODULE = "epuck_mj.bridge"
 SECONDS_MAX = 24 * 3600
+
+
+EXAMPLES = (
+    "python -m epuck_mj.bridge runs/ga-seed-1 --port /dev/rfcomm0",
+    "python -m epuck_mj.bridge wall-follower --port COM5 --seconds 20",
+)
 
 
 @dataclass(frozen=True)
@@ -41,22 +48,22 @@ class Options:
         list_ports: list the serial ports of this computer and exit.
     """
 
-    champion: tyro.conf.Positional[str] = ""
-    port: str = ""
-    seconds: float = 60.0
+    champion: tyro.conf.Positional[Annotated[str, word("RUN")]] = ""
+    port: Annotated[str, word("PORT")] = ""
+    seconds: Annotated[float, word("SECONDS")] = 60.0
     calibrate: bool = False
-    calibration: Path | None = None
-    pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    max_speed: float | None = None
+    calibration: Annotated[Path | None, word("FILE")] = None
+    pose: Annotated[tuple[float, float, float], word("X Y DEGREES")] = (0.0, 0.0, 0.0)
+    max_speed: Annotated[float | None, word("METRES")] = None
     dry_run: bool = False
-    arena: str | None = None
-    log: Path | None = None
+    arena: Annotated[str | None, word("ARENA")] = None
+    log: Annotated[Path | None, word("FILE")] = None
     list_ports: bool = False
 
 
 def bridge(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
-    options = parse(Options, f"python -m {MODULE}", argv)
+    options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     if options.list_ports:
         for name, description in ports():
             print(f"{name}  {description}")

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from epuck_mj.bridge.failures import DONE, FAILED, RUNAWAY, BridgeError, StillMoving
 from epuck_mj.bridge.line.connect import connect
@@ -13,12 +13,18 @@ from epuck_mj.bridge.line.interfaces import Connection
 from epuck_mj.calibrate.bench import Bench
 from epuck_mj.calibrate.guide import STEPS, Person
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import main, parse
+from epuck_mj.host.command_line import main, parse, word
 from epuck_mj.host.files import check_writable, is_file
 from epuck_mj.host.interruption import Interrupted, Interruption
 from epuck_mj.step.calibration import Calibration
 
 MODULE = "epuck_mj.calibrate"
+
+
+EXAMPLES = (
+    "python -m epuck_mj.calibrate --port /dev/rfcomm0",
+    "python -m epuck_mj.calibrate --port COM5 --only sensors --output robot.yaml",
+)
 
 
 @dataclass(frozen=True)
@@ -33,9 +39,9 @@ class Options:
         only: do only this step, instead of straight, turn and sensors.
     """
 
-    port: str = ""
-    output: Path = Path("robot.yaml")
-    only: Literal["straight", "turn", "sensors"] | None = None
+    port: Annotated[str, word("PORT")] = ""
+    output: Annotated[Path, word("FILE")] = Path("robot.yaml")
+    only: Annotated[Literal["straight", "turn", "sensors"] | None, word("STEP")] = None
 
 
 def calibrate(argv: Sequence[str], ask: Callable[[str], str] = input) -> int:
@@ -45,7 +51,7 @@ def calibrate(argv: Sequence[str], ask: Callable[[str], str] = input) -> int:
         argv: what was typed.
         ask: shows a question and gives the answer.
     """
-    options = parse(Options, f"python -m {MODULE}", argv)
+    options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     if not options.port:
         raise UserError("expected --port, as for python -m epuck_mj.bridge")
     steps = tuple(STEPS) if options.only is None else (options.only,)
@@ -82,6 +88,8 @@ def calibrate_robot(
         person = Person(ask, interruption)
         print("The robot drives. Ctrl-C stops it and ends.", flush=True)
         try:
+            # before anybody lays out a floor
+            bench.with_robot(known, lambda robot: None)
             for step in steps:
                 known = STEPS[step](bench, person, known)
                 known.save(output)

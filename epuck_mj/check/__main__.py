@@ -7,11 +7,17 @@ command lines here, if there is no arena to look at: bad options, no file, no te
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 
-from epuck_mj.host.command_line import main, parse
+from epuck_mj.host.command_line import main, parse, word
 from epuck_mj.scene.model_files import SHIPPED_ROBOTS
+
+EXAMPLES = (
+    "python -m epuck_mj.check my.xml",
+    "python -m epuck_mj.check my.xml --picture my.png",
+)
 
 
 @dataclass(frozen=True)
@@ -21,17 +27,17 @@ class Options:
     The exit status is 1 if the arena cannot be used.
     """
 
-    arena: tyro.conf.Positional[str]
+    arena: tyro.conf.Positional[Annotated[str, word("ARENA")]]
     """name of a shipped arena, or path of an MJCF file"""
-    robot: str | None = None
+    robot: Annotated[str | None, word("ROBOT")] = None
     """name of a shipped robot, or path of an MJCF file; both shipped ones by default"""
-    picture: Path | None = None
+    picture: Annotated[Path | None, word("FILE")] = None
     """PNG file to draw the walls and the free space to, seen from above"""
 
 
 def check(argv: Sequence[str]) -> int:
     """Check an arena and print the findings; the exit status."""
-    options = parse(Options, "python -m epuck_mj.check", argv)
+    options = parse(Options, "python -m epuck_mj.check", argv, examples=EXAMPLES)
     # physics and pictures are for a command that makes sense
     from epuck_mj.check import report
     from epuck_mj.check.arena import check_arena

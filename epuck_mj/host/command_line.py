@@ -8,7 +8,7 @@ import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import tyro
 
@@ -17,8 +17,17 @@ from epuck_mj.errors import UserError
 Options = TypeVar("Options")
 
 
+def word(metavar: str) -> Any:
+    """The marker of a flag whose help shows that word for its value."""
+    return tyro.conf.arg(metavar=metavar)
+
+
 def parse(
-    kind: type[Options], prog: str, argv: Sequence[str], default: Options | None = None
+    kind: type[Options],
+    prog: str,
+    argv: Sequence[str],
+    default: Options | None = None,
+    examples: Sequence[str] = (),
 ) -> Options:
     """Parse `argv` into options whose flags are the fields of `kind`.
 
@@ -27,6 +36,7 @@ def parse(
         prog: how a person calls the program.
         argv: what was typed behind it.
         default: options that flags change; None takes the defaults of `kind`.
+        examples: command lines that the help ends with.
 
     Raises:
         UserError: if the arguments cannot be understood.
@@ -47,9 +57,22 @@ def parse(
                 ),
             )
     except SystemExit as error:
-        if not error.code:
-            raise
-        raise UserError(_unboxed(box.getvalue())) from None
+        if error.code:
+            raise UserError(_in_one_line(box.getvalue(), prog)) from None
+        if examples:
+            print("examples:", *examples, sep="\n  ")
+        raise
+
+
+def _in_one_line(text: str, prog: str) -> str:
+    """The message of tyro's box, with the flag that may have been meant."""
+    message = _unboxed(text)
+    if message.startswith("Unrecognized options"):
+        unknown = message.partition(": ")[2].replace(",", "")
+        meant = re.search(r"Perhaps you meant:\W+(--[\w-]+)", text)
+        hint = f"did you mean {meant[1]}?" if meant else f"see {prog} --help"
+        return f"unknown option {unknown}; {hint}"
+    return message
 
 
 def _unboxed(text: str) -> str:
@@ -76,6 +99,18 @@ EXTRAS = (
     (r" ?\[type=value_error, input_value=\{.*?, input_type=dict\]", ""),
     (r" ?\[type=\w+, input_value=(.*?), input_type=\w+\]", r", got \1"),
     (r" ?For further information visit \S+", ""),
+    (
+        r"^Error parsing (\S+): invalid literal for int\(\) with base 10: ",
+        r"\1: expected a whole number, got ",
+    ),
+    (
+        r"^Error parsing (\S+): could not convert string to float: ",
+        r"\1: expected a number, got ",
+    ),
+    (r"^(\w+) Input should be greater than or equal to ", r"\1: expected at least "),
+    (r"^(\w+) Input should be less than or equal to ", r"\1: expected at most "),
+    (r"^(\w+) Input should be greater than ", r"\1: expected more than "),
+    (r"^(\w+) Input should be ", r"\1: expected "),
 )
 """Texts that pydantic adds for programmers, and their replacements."""
 

@@ -8,6 +8,7 @@ remembered.
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from typing import Any, Self
 
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
@@ -95,9 +96,21 @@ def _follows_interruption(error: BaseException) -> bool:
 
 @contextmanager
 def deaf_to_interrupts() -> Iterator[None]:
-    """Let processes started in the block ignore Ctrl-C, as their parent ends them."""
-    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Let processes started in the block ignore Ctrl-C, as their parent ends them.
+
+    A Ctrl-C during the block reaches this process when the block ends.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, previous)
+        return
+    # as it starts, it lets signals in again
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, previous)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -9,11 +9,15 @@ from typing import Any, Self
 import numpy as np
 
 from epuck_mj.errors import UserError
+from epuck_mj.host.files import is_file
 from epuck_mj.host.yaml_and_json import read_json
 from epuck_mj.policies.topology import Topology, topology_from
 from epuck_mj.step.control import BatchPolicy, TaskParameters
 
 FORMAT = "epuck_mj.controller/1"
+
+CHAMPION = "champion.json"
+"""Controller file in the directory of a finished run."""
 
 
 @dataclass(frozen=True)
@@ -121,12 +125,17 @@ class ControllerFile:
 
 
 def load_controller(path: str | Path) -> ControllerFile:
-    """The controller stored at `path`.
+    """The controller stored at `path`, a file or the directory of a finished run.
 
     Raises:
         UserError: if there is none, or it is not a controller file.
     """
-    fields = read_json(Path(path))
+    path = Path(path)
+    if path.is_dir():
+        path /= CHAMPION
+        if not is_file(path):
+            raise UserError(f"no champion in '{path.parent}': its run is not finished")
+    fields = read_json(path)
     try:
         return ControllerFile.from_dict(fields)
     except (ValueError, TypeError, OverflowError) as error:

@@ -93,6 +93,12 @@ class TaskParameters:
         return task
 
     @property
+    def most(self) -> float | None:
+        """The most that a trial can earn; None if that is not known."""
+        maximum = self.step_fitness.maximum
+        return None if maximum is None else self.steps * maximum
+
+    @property
     def step_fitness(self) -> StepFitness:
         """The function of the step fitness."""
         return step_fitness(self.fitness)

@@ -9,13 +9,13 @@ import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import tyro
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import main, parse
+from epuck_mj.host.command_line import main, parse, word
 from epuck_mj.host.files import is_file
 from epuck_mj.host.yaml_and_json import read_yaml
 from epuck_mj.policies.file import load_controller
@@ -29,19 +29,25 @@ if TYPE_CHECKING:
     from epuck_mj.scene.model import Scene
 
 
+EXAMPLES = (
+    "python -m epuck_mj.view arena runs/ga-seed-1/champion.json",
+    "python -m epuck_mj.view my.xml --seconds 30",
+)
+
+
 @dataclass(frozen=True)
 class Options:
     """Watch a controller drive in MuJoCo's viewer until the window is closed."""
 
-    arena: tyro.conf.Positional[str]
+    arena: tyro.conf.Positional[Annotated[str, word("ARENA")]]
     """name of a shipped arena, or path of an MJCF file"""
-    champion: tyro.conf.Positional[Path | None] = None
+    champion: tyro.conf.Positional[Annotated[Path | None, word("RUN")]] = None
     """controller file (JSON); the hand-written wall follower by default"""
-    robot: str = "epuck"
+    robot: Annotated[str, word("ROBOT")] = "epuck"
     """name of a shipped robot, or path of an MJCF file"""
-    pose: tuple[float, float, float] | None = None
+    pose: Annotated[tuple[float, float, float] | None, word("X Y DEGREES")] = None
     """start of every trial: x, y [m] and heading [degrees]; random starts by default"""
-    seconds: float | None = None
+    seconds: Annotated[float | None, word("SECONDS")] = None
     """duration of a trial [s]; the controller's own by default"""
     seed: int = 0
     """seed of random starts and noise"""
@@ -51,7 +57,7 @@ class Options:
 
 def view(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
-    options = parse(Options, "python -m epuck_mj.view", argv)
+    options = parse(Options, "python -m epuck_mj.view", argv, examples=EXAMPLES)
     policy: Policy = WallFollower()
     task = TaskParameters()
     conditions = options.robots.conditions

@@ -3,17 +3,24 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import check_threads, main, parse
+from epuck_mj.host.command_line import check_threads, main, parse, word
 from epuck_mj.host.files import check_writable, writing
 from epuck_mj.scene.model_files import PLANAR_ROBOT, WHEELED_ROBOT
 from evolution.named_policies import policies_of
 
 NUMBER_MAX = 1000
 """Most worlds, and most starts in each."""
+
+
+EXAMPLES = (
+    "python -m evolution.gap results/paper --output gap",
+    "python -m evolution.gap runs/a runs/b --output gap --worlds 20",
+)
 
 
 @dataclass(frozen=True)
@@ -29,17 +36,17 @@ class GapOptions:
         threads: threads that step the robots; 0 is one per core. Changes no result.
     """
 
-    paths: tyro.conf.Positional[tuple[str, ...]]
-    output: Path
+    paths: tyro.conf.Positional[Annotated[tuple[str, ...], word("RUN")]]
+    output: Annotated[Path, word("FOLDER")]
     worlds: int = 100
     starts: int = 20
-    robot: str | None = None
+    robot: Annotated[str | None, word("ROBOT")] = None
     threads: int = 0
 
 
 def measure_gap(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
-    options = parse(GapOptions, "python -m evolution.gap", argv)
+    options = parse(GapOptions, "python -m evolution.gap", argv, examples=EXAMPLES)
     for name, value in (("worlds", options.worlds), ("starts", options.starts)):
         if not 2 <= value <= NUMBER_MAX:
             raise UserError(f"expected 2 to {NUMBER_MAX} {name}, got {value}")

@@ -12,6 +12,7 @@ from typing import Any, Self
 from pydantic import BaseModel, Field, StrictFloat, StrictInt, ValidationError
 
 from epuck_mj.errors import UserError
+from epuck_mj.scene.model_files import WHEELED_ROBOT
 
 
 class _Record(BaseModel, frozen=True, allow_inf_nan=False):
@@ -115,18 +116,34 @@ class Scores(_Record, frozen=True):
     most_believed: Believed | None = None
     held_out_as_evolved: Mapping[str, HeldOut] = {}
 
-    def in_lines(self, steps: int) -> str:
-        """Lines with held-out fitness on each robot and stored fitness, of `steps`."""
-        starts = next(iter(self.held_out.values())).starts
+    def in_lines(self, most: float | None) -> str:
+        """Lines with the champion's held-out fitness, and why others are higher.
+
+        Args:
+            most: fitness that a trial can reach; None if that is not known.
+        """
+        first, *others = sorted(self.held_out, key=lambda robot: robot != WHEELED_ROBOT)
+        test = self.held_out[first]
+        of = "" if most is None else f" of {most:g}"
         lines = [
-            f"Held-out fitness of {steps}, mean of {starts} new starts: "
-            + _in_words(self.held_out),
-            f"Stored fitness of {steps}, on the starts of evolution: {self.stored:.1f}",
+            f"The champion earns {test.mean:.1f}{of}: the mean of {test.starts:,} "
+            f"fresh starts on {first}, {test.crash_rate:.0%} of them end in a crash"
         ]
+        if others:
+            lines.append(f"On {_in_words({o: self.held_out[o] for o in others})}")
         if self.held_out_as_evolved:
             disturbed = _in_words(self.held_out_as_evolved)
-            lines.insert(
-                1, f"Held-out fitness with the disturbances of evolution: {disturbed}"
+            lines.append(f"With the disturbances it evolved with: {disturbed}")
+        lines.append(
+            f"Evolution stored {self.stored:.1f} for it, from the few starts of its "
+            "own trials"
+        )
+        if self.most_believed is not None:
+            stored, held_out = self.most_believed.stored, self.most_believed.held_out
+            lines.append(
+                f"The highest fitness that evolution stored, {stored:.1f}, is what an "
+                f"individual earned on its luckiest few starts: fresh ones give it "
+                f"{held_out:.1f}"
             )
         return "\n".join(lines)
 

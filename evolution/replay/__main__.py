@@ -9,9 +9,15 @@ from evolution.replay.options import Options
 MODULE = "evolution.replay"
 
 
+EXAMPLES = (
+    "python -m evolution.replay runs/ga-seed-1",
+    "python -m evolution.replay runs/ga-seed-1 --trials 4 --save trials.rrd",
+)
+
+
 def replay(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
-    options = parse(Options, f"python -m {MODULE}", argv)
+    options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     paths = [path for path in (options.path, *options.compare) if path]
     if not paths:
         raise UserError(

@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 
+from epuck_mj.host.command_line import word
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.step.conditions import ConditionFlags
 
@@ -35,16 +37,16 @@ class Options:
         image: file to write a picture of the end to (.png); needs EGL or OSMesa.
     """
 
-    path: tyro.conf.Positional[str] = ""
-    compare: tuple[str, ...] = ()
-    generations: str | None = None
-    trials: int | None = None
-    starts: str | None = None
-    pose: tuple[float, ...] = ()
-    robot: str = WHEELED_ROBOT
-    arena: str | None = None
+    path: tyro.conf.Positional[Annotated[str, word("RUN")]] = ""
+    compare: Annotated[tuple[str, ...], word("RUN")] = ()
+    generations: Annotated[str | None, word("NUMBERS")] = None
+    trials: Annotated[int | None, word("N")] = None
+    starts: Annotated[str | None, word("STARTS")] = None
+    pose: Annotated[tuple[float, ...], word("X Y DEGREES")] = ()
+    robot: Annotated[str, word("ROBOT")] = WHEELED_ROBOT
+    arena: Annotated[str | None, word("ARENA")] = None
     robots: ConditionFlags = field(default_factory=ConditionFlags)
-    save: Path | None = None
-    web: Path | None = None
-    video: Path | None = None
-    image: Path | None = None
+    save: Annotated[Path | None, word("FILE")] = None
+    web: Annotated[Path | None, word("FOLDER")] = None
+    video: Annotated[Path | None, word("FILE")] = None
+    image: Annotated[Path | None, word("FILE")] = None

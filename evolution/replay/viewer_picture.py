@@ -13,12 +13,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import tyro
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import main, parse
+from epuck_mj.host.command_line import main, parse, word
 from epuck_mj.host.files import write_bytes, writing
 from evolution.replay.viewer import viewer_binary
 from evolution.replay.web import free_ports
@@ -43,8 +43,8 @@ class ViewerPictureOptions:
         size: width and height of the viewer [pixels].
     """
 
-    recording: tyro.conf.Positional[Path]
-    output: Path
+    recording: tyro.conf.Positional[Annotated[Path, word("FILE")]]
+    output: Annotated[Path, word("FILE")]
     time: float = 25.0
     size: tuple[int, int] = (1600, 1000)
 

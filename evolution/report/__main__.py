@@ -4,10 +4,16 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 
-from epuck_mj.host.command_line import main, parse
+from epuck_mj.host.command_line import main, parse, word
+
+EXAMPLES = (
+    "python -m evolution.report runs/paper --output report",
+    "python -m evolution.report runs/paper --output report --ioh",
+)
 
 
 @dataclass(frozen=True)
@@ -23,14 +29,16 @@ class ReportOptions:
         ioh: also export the histories for IOHanalyzer, to `ioh` in the output.
     """
 
-    study: tyro.conf.Positional[Path]
-    output: Path | None = None
+    study: tyro.conf.Positional[Annotated[Path, word("STUDY")]]
+    output: Annotated[Path | None, word("FOLDER")] = None
     ioh: bool = False
 
 
 def report_study(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
-    options = parse(ReportOptions, "python -m evolution.report", argv)
+    options = parse(
+        ReportOptions, "python -m evolution.report", argv, examples=EXAMPLES
+    )
     # slow to import
     from evolution.report.report_folder import write_report
 

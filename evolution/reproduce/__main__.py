@@ -1,4 +1,4 @@
-"""The whole study in one command: `python -m evolution.reproduce [--quick | --full]`.
+"""The whole study by one command: `python -m evolution.reproduce --quick`.
 
 Runs the study, reports it, and tests each of the paper's claims on it.
 """
@@ -7,10 +7,11 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.host.command_line import main, parse, shell_command
+from epuck_mj.host.command_line import main, parse, shell_command, word
 from epuck_mj.step.fitness import FORMULAS
 from evolution.report.__main__ import report_study
 from evolution.study.__main__ import study
@@ -18,6 +19,12 @@ from evolution.study.__main__ import study
 QUICK = (("quick", "1-3"),)
 FULL = (("paper", "1-30"), ("wheels", "1-3"))
 """Studies and their seeds."""
+
+
+EXAMPLES = (
+    "python -m evolution.reproduce --quick",
+    "python -m evolution.reproduce --study runs/paper",
+)
 
 
 @dataclass(frozen=True)
@@ -37,16 +44,22 @@ class ReproduceOptions:
 
     quick: bool = False
     full: bool = False
-    output: Path = Path("runs/reproduction")
-    study: Path | None = None
-    wheels: Path | None = None
+    output: Annotated[Path, word("FOLDER")] = Path("runs/reproduction")
+    study: Annotated[Path | None, word("STUDY")] = None
+    wheels: Annotated[Path | None, word("STUDY")] = None
 
 
 def reproduce_paper(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
-    options = parse(ReproduceOptions, "python -m evolution.reproduce", argv)
-    if [options.quick, options.full, options.study is not None].count(True) > 1:
-        raise UserError("expected one of --quick, --full and --study")
+    options = parse(
+        ReproduceOptions, "python -m evolution.reproduce", argv, examples=EXAMPLES
+    )
+    if [options.quick, options.full, options.study is not None].count(True) != 1:
+        raise UserError(
+            "expected one of --quick (3 seeds, ten minutes on two cores), --full (30 "
+            "seeds, days on two cores) and --study (write the verdict on a study that "
+            "is there)"
+        )
     if options.wheels is not None:
         if options.study is None:
             raise UserError("expected --study with --wheels")

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, make_dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import check_threads, main, parse, shell_command
+from epuck_mj.host.command_line import check_threads, main, parse, shell_command, word
 from epuck_mj.host.interruption import Interrupted, Interruption
 from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
@@ -24,6 +24,12 @@ if TYPE_CHECKING:
     from evolution.run.execution import Run
 
 MODULE = "evolution.run"
+
+
+EXAMPLES = (
+    "python -m evolution.run ga --seed 7 --evaluations 3000",
+    "python -m evolution.run --resume runs/ga-seed-7",
+)
 
 
 @dataclass(frozen=True)
@@ -41,18 +47,18 @@ class Options:
         threads: threads that step the robots; 0 is one per core. Changes no result.
         engine: batch steps all robots at once; dm_control runs one trial after the
             other. Changes no result.
-        racing: stop simulating individuals that cannot win any more, if the optimiser
-            allows it (--no-racing simulates all to the end). Changes no result.
+        racing: --no-racing also simulates individuals that cannot win any more, which
+            are stopped otherwise. Changes no result.
         live: show curves and the best individual in a rerun viewer that is running.
             Changes no result.
         print_config: print the complete configuration as YAML and exit.
     """
 
-    experiment: tyro.conf.Positional[str]
+    experiment: tyro.conf.Positional[Annotated[str, word("EXPERIMENT")]]
     config: ExperimentConfig
-    optimizer: str | None = None
-    output: Path | None = None
-    resume: Path | None = None
+    optimizer: Annotated[str | None, word("FILE:CLASS")] = None
+    output: Annotated[Path | None, word("FOLDER")] = None
+    resume: Annotated[Path | None, word("RUN")] = None
     threads: int = 0
     engine: Literal["batch", "dm_control"] = "batch"
     racing: bool = True
@@ -128,7 +134,9 @@ def _options(argv: Sequence[str]) -> Options:
         own = config.model_dump() | {"optimizer": {"algorithm": optimizer}}
         config = ExperimentConfig.parsed(own, "--optimizer")
     default = _kind(config)(experiment, config, optimizer=optimizer)
-    options = parse(type(default), f"python -m {MODULE}", argv, default)
+    options = parse(
+        type(default), f"python -m {MODULE}", argv, default, examples=EXAMPLES
+    )
     if options.experiment != experiment:
         first = shell_command(MODULE, options.experiment, "...")
         raise UserError(f"expected the experiment as the first argument: {first}")
@@ -170,7 +178,7 @@ def _carry_out(run: "Run", live: bool) -> int:
         f"{evolution.evaluations:,} evaluations in {len(evolution.records)} "
         f"generations, {minutes} min {seconds} s"
     )
-    print(scores.in_lines(evolution.config.steps))
+    print(scores.in_lines(evolution.config.task.most))
     print(f"Written to {directory.path}: {directory.contents()}")
     print(_replay(directory))
     return 0
@@ -183,16 +191,13 @@ def _finished(run: "Run", live: bool) -> Scores:
 
     evolution = run.evolution
     budget = evolution.config.evaluations
-    with (
-        Live(evolution) if live else nullcontext() as view,
-        Progress(budget, evolution.evaluations) as progress,
-    ):
-        for record in run.evolve():
-            progress.update(record)
-            if view is not None:
-                view.update()
-    print("Choosing the champion on fresh starts ...", file=sys.stderr)
-    return run.finish()
+    with Progress(budget, evolution.evaluations) as progress:
+        with Live(evolution) if live else nullcontext() as view:
+            for record in run.evolve():
+                progress.update(record)
+                if view is not None:
+                    view.update()
+        return run.finish(progress.stage)
 
 
 def _replay(directory: RunDirectory) -> str:

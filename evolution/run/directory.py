@@ -12,6 +12,7 @@ from filelock import FileLock, Timeout
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.yaml_and_json import read_json
+from epuck_mj.policies.file import CHAMPION
 from evolution.run.provenance import now, to_json
 from evolution.settings.comparison import differing_keys
 from evolution.settings.config import ExperimentConfig
@@ -66,7 +67,7 @@ class RunDirectory:
         self.history = path / "history.csv"
         self.best_individuals = path / "best_individuals.npz"
         self.timing = path / "timing.csv"
-        self.champion = path / "champion.json"
+        self.champion = path / CHAMPION
         self.fitness_figure = path / "fitness.png"
         self.trajectory = path / "trajectory.npz"
         self.trajectory_figure = path / "trajectory.png"

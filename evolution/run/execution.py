@@ -14,7 +14,7 @@ from evolution.run.directory import RunDirectory
 from evolution.run.generation_loop import Evolution, Record
 from evolution.run.means import Means
 from evolution.run.provenance import provenance
-from evolution.run.results import write_results
+from evolution.run.results import Stage, silent, write_results
 from evolution.settings.config import ExperimentConfig
 
 SAVING_SHARE = 0.05
@@ -87,15 +87,18 @@ class Run:
                 cost, seconds = before - after, []
             yield record
 
-    def finish(self) -> Scores:
+    def finish(self, stage: Stage = silent) -> Scores:
         """Choose and test the champion and write all its files; its scores.
+
+        Args:
+            stage: told what is done next.
 
         Raises:
             UserError: if it cannot be written.
         """
         with writing():
             scores = write_results(
-                self.evolution, self._judges, self.directory, self._threads
+                self.evolution, self._judges, self.directory, stage, self._threads
             )
         self.directory.mark_finished()
         return scores

@@ -1,31 +1,36 @@
 """Progress of a run: a bar on a terminal, a line now and then elsewhere."""
 
 import sys
-from typing import Self
+import threading
+from typing import Any, Self
 
 from tqdm import tqdm
 
 from evolution.run.generation_loop import Record
 
 LINES = 20
-"""Lines that a whole run prints where there is no terminal."""
+"""Lines that the generations of a run print where there is no terminal."""
+
+TICK = 0.5
+"""Time between two updates of a bar's clock [s]."""
 
 
 class Progress:
-    """Shows the records of a run as they come."""
+    """Shows how far a run is: its generations, then the stages that choose a champion.
+
+    On a terminal the clock of the bar goes on between two updates.
+    """
 
     def __init__(self, budget: int, done: int):
         """Start at `done` of `budget` evaluations."""
         self._budget = budget
         self._next_line = done
         self._terminal = sys.stderr.isatty()
-        self._bar = tqdm(
-            total=budget,
-            initial=done,
-            unit="eval",
-            dynamic_ncols=True,
-            disable=not self._terminal,
-        )
+        self._bar = self._new_bar(total=budget, initial=done, unit="eval")
+        self._ended = threading.Event()
+        self._clock = threading.Thread(target=self._tick, daemon=True)
+        if self._terminal:
+            self._clock.start()
 
     def update(self, record: Record) -> None:
         """Show one more generation."""
@@ -44,10 +49,38 @@ class Progress:
             print(line, file=sys.stderr, flush=True)
             self._next_line += self._budget / LINES
 
+    def stage(self, text: str, number: int, stages: int) -> None:
+        """Show that the next stage begins, of so many that choose the champion.
+
+        Args:
+            text: what is done in it.
+            number: of the stage, from 0 on.
+            stages: how many there are.
+        """
+        if not self._terminal:
+            print(f"{text} ...", file=sys.stderr, flush=True)
+            return
+        if number == 0:
+            self._bar.close()
+            self._bar = self._new_bar(total=stages, unit="stage")
+        self._bar.update(number - self._bar.n)
+        self._bar.set_description(text)
+
+    def _new_bar(self, **options: Any) -> tqdm:
+        return tqdm(dynamic_ncols=True, disable=not self._terminal, **options)
+
+    def _tick(self) -> None:
+        """Redraw the bar until the end."""
+        while not self._ended.wait(TICK):
+            self._bar.refresh()
+
     def __enter__(self) -> Self:
         """Itself."""
         return self
 
     def __exit__(self, *exception: object) -> None:
         """Leave the terminal tidy."""
+        self._ended.set()
+        if self._terminal:
+            self._clock.join()
         self._bar.close()

@@ -1,6 +1,7 @@
 """Results of a finished run: its champion, tested, drawn and recorded."""
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -23,11 +24,19 @@ from evolution.settings.randomness import Purpose
 N_SHOWN = 4
 """Trials of the champion in the picture; the first is also the recording."""
 
+Stage = Callable[[str, int, int], None]
+"""Told what is done next, the number of that stage, and how many there are."""
+
+
+def silent(text: str, number: int, stages: int) -> None:
+    """A `Stage` that tells nobody."""
+
 
 def write_results(
     evolution: Evolution,
     judges: Mapping[str, Judge],
     directory: RunDirectory,
+    stage: Stage = silent,
     threads: int = 0,
 ) -> Scores:
     """Choose the champion, test it, and write everything that shows it.
@@ -36,41 +45,50 @@ def write_results(
         evolution: a finished run.
         judges: by robot, as of `Judges.tested_on`.
         directory: where to write.
+        stage: told what is done next.
         threads: that step the robots; 0 is one per core.
 
     Returns:
         The champion's scores, as written.
     """
-    config = evolution.config
-    champion = choose_champion(
-        BatchEngine(evolution.scene, config.task, threads), evolution
-    )
-    policy = config.topology.decode(champion.genome)
-    n = config.test_starts
+    config, n = evolution.config, evolution.config.test_starts
     met = held_out_disturbances(config.conditions, Purpose.TEST, n, config.steps)
-    as_evolved = {
-        robot: judge.test(policy, n, met)
-        for robot, judge in judges.items()
-        if met is not None
-    }
+    stages = 4 + len(judges) * (1 if met is None else 2)
+    number = itertools.count()
+    fresh = f"{config.validation_starts:,} fresh starts"
+    stage(f"Choosing the champion on {fresh}", next(number), stages)
+    engine = BatchEngine(evolution.scene, config.task, threads)
+    champion = choose_champion(engine, evolution)
+    policy = config.topology.decode(champion.genome)
+    held_out, as_evolved = {}, {}
+    for robot, judge in judges.items():
+        where = f"on {n:,} other starts, {robot}"
+        stage(f"Testing it {where}", next(number), stages)
+        held_out[robot] = judge.test(policy, n)
+        if met is not None:
+            stage(f"Testing it with disturbances {where}", next(number), stages)
+            as_evolved[robot] = judge.test(policy, n, met)
     # what the run believed its best to be, and what that is worth on an ideal robot
+    stage("Testing the individual of the highest fitness", next(number), stages)
     genome, stored = most_believed(evolution)
     believed = next(iter(judges.values())).test(config.topology.decode(genome), n)
     scores = Scores(
         stored=champion.stored_fitness,
         validation=champion.validation_fitness,
-        held_out={robot: judge.test(policy, n) for robot, judge in judges.items()},
+        held_out=held_out,
         most_believed=Believed(stored=stored, held_out=believed.mean),
     )
     if as_evolved:
         scores = scores.model_copy(update={"held_out_as_evolved": as_evolved})
     controller = _controller_file(evolution, champion, scores)
     files.write_text(directory.champion, controller.to_json())
+    stage("Drawing the fitness", next(number), stages)
     _draw_fitness(evolution, directory)
+    stage("Recording the champion", next(number), stages)
     wheeled = judges[WHEELED_ROBOT]
     starts = wheeled.starts(N_SHOWN)
     shown = None if met is None else met[:N_SHOWN]
-    text = scores.in_lines(config.steps)
+    text = scores.in_lines(config.task.most)
     _show(evolution, directory, policy, wheeled.scene, starts, shown, text)
     return scores
 

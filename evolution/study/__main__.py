@@ -8,13 +8,14 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 from tqdm import tqdm
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.host.command_line import main, parse, shell_command
+from epuck_mj.host.command_line import main, parse, shell_command, word
 from epuck_mj.host.interruption import Interrupted, Interruption
 from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
@@ -27,6 +28,12 @@ from evolution.study.jobs import Event, Job, carry_out_side_by_side
 
 MODULE = "evolution.study"
 JOBS_MAX = 1024
+
+
+EXAMPLES = (
+    "python -m evolution.study quick --seeds 1-3 --output runs/quick",
+    "python -m evolution.study mine.yaml --seeds 1-10 --output runs/mine",
+)
 
 
 @dataclass(frozen=True)
@@ -44,8 +51,8 @@ class Options:
             given.
         jobs: number of runs side by side; 0 is one per core. Remaining cores are used
             as threads.
-        racing: stop simulating individuals that cannot win any more (--no-racing
-            simulates all to the end). Changes no result.
+        racing: --no-racing also simulates individuals that cannot win any more, which
+            are stopped otherwise. Changes no result.
         cluster: address of the Dask scheduler that runs are sent to, such as
             tcp://host:8786, or local:4 to start four workers on this machine. Needs the
             extra [cluster].
@@ -53,13 +60,13 @@ class Options:
             workers.
     """
 
-    study: tyro.conf.Positional[str]
-    output: Path
-    seeds: str = "1-30"
-    experiments: str | None = None
+    study: tyro.conf.Positional[Annotated[str, word("STUDY")]]
+    output: Annotated[Path, word("FOLDER")]
+    seeds: Annotated[str, word("SEEDS")] = "1-30"
+    experiments: Annotated[str | None, word("NAMES")] = None
     jobs: int = 0
     racing: bool = True
-    cluster: str | None = None
+    cluster: Annotated[str | None, word("ADDRESS")] = None
     split: bool = False
 
 
@@ -69,7 +76,7 @@ def study(argv: Sequence[str]) -> int:
     Raises:
         UserError: for anything the user can put right.
     """
-    options = parse(Options, f"python -m {MODULE}", argv)
+    options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     if not 0 <= options.jobs <= JOBS_MAX:
         raise UserError(f"expected jobs from 0 to {JOBS_MAX}, got {options.jobs}")
     if options.split and options.cluster is None:

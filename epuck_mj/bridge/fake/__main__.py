@@ -7,12 +7,13 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from epuck_mj.bridge.fake.scenarios import random_scenario, scenario
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import main, parse
+from epuck_mj.host.command_line import main, parse, word
 from epuck_mj.host.files import check_writable
 from epuck_mj.host.interruption import Interrupted, Interruption
 
@@ -20,6 +21,12 @@ MODULE = "epuck_mj.bridge.fake"
 RANDOM = "random"
 RANDOM_END = 10.0
 """Latest start of a fault in a random scenario [s]."""
+
+
+EXAMPLES = (
+    "python -m epuck_mj.bridge.fake",
+    "python -m epuck_mj.bridge.fake --tcp 5000 --scenario stall@2",
+)
 
 
 @dataclass(frozen=True)
@@ -44,23 +51,23 @@ class Options:
         journal: file (.npz) to record everything that the robot did to.
     """
 
-    arena: str = "arena"
-    robot: str = "epuck"
-    pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    firmware: str = "asercom"
-    link: Path | None = None
-    tcp: int | None = None
-    wifi: int | None = None
-    scenario: str = ""
+    arena: Annotated[str, word("ARENA")] = "arena"
+    robot: Annotated[str, word("ROBOT")] = "epuck"
+    pose: Annotated[tuple[float, float, float], word("X Y DEGREES")] = (0.0, 0.0, 0.0)
+    firmware: Annotated[str, word("NAME")] = "asercom"
+    link: Annotated[Path | None, word("FILE")] = None
+    tcp: Annotated[int | None, word("PORT")] = None
+    wifi: Annotated[int | None, word("PORT")] = None
+    scenario: Annotated[str, word("FAULTS")] = ""
     seed: int = 0
-    latency: float = 0.0
+    latency: Annotated[float, word("SECONDS")] = 0.0
     speed: float = 1.0
-    journal: Path | None = None
+    journal: Annotated[Path | None, word("FILE")] = None
 
 
 def fake(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
-    options = parse(Options, f"python -m {MODULE}", argv)
+    options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     _refuse_bad_options(options)
     # physics is not for those who only ask for help
     from epuck_mj.bridge.fake.emulator import WIFI, Emulator
