@@ -26,7 +26,7 @@ from evolution.settings.config_files import find_config, load_config
 from evolution.study.config import parse_seeds
 
 EVERY = 10
-"""Of so many generations one is lived both ways."""
+"""Number of generations of which one is run both ways."""
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,7 @@ def main(options: Options) -> None:
 def measure(robot: str, repeats: int) -> dict[str, float]:
     """Medians of the ratios of interleaved repeats."""
     scene = load_scene(robot, "arena")
-    # small circles: everybody lives all steps
+    # small circles: no robot crashes
     task = TaskParameters(steps=100)
     starts = FreeSpace(scene, 0.12).sample(np.random.default_rng(0), N_ROBOTS)
     controller = Network().decode(_harmless(N_ROBOTS))

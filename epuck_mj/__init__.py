@@ -23,12 +23,12 @@ _MODULES = {
 
 
 def __getattr__(name: str) -> Any:
-    """A public name, whose module is imported by the first who asks (PEP 562)."""
+    """Import the module of a public name at its first use (PEP 562)."""
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(_MODULES[name]), name)
 
 
 def __dir__() -> list[str]:
-    """All public names, imported or not."""
+    """Names of the module, including those not yet imported."""
     return sorted({*globals(), *__all__})

@@ -1,10 +1,10 @@
 """The commands of this package: `python -m epuck_mj`."""
 
 COMMANDS = {
-    "epuck_mj.check": "what is in an arena, and what is wrong with it",
-    "epuck_mj.view": "a champion in MuJoCo's own viewer",
-    "epuck_mj.bridge": "drive a real e-puck, or the emulated one",
-    "epuck_mj.bridge.fake": "an emulated e-puck on a serial port",
+    "epuck_mj.check": "list what is in an arena and what is wrong with it",
+    "epuck_mj.view": "watch a champion in MuJoCo's own viewer",
+    "epuck_mj.bridge": "drive a real e-puck or the emulated one",
+    "epuck_mj.bridge.fake": "emulate an e-puck on a serial port",
     "epuck_mj.calibrate": "measure one robot's sensors and wheels",
 }
 """Modules that are commands, and what each does."""
@@ -16,7 +16,7 @@ def listing(commands: dict[str, str]) -> str:
     lines = [
         f"{'python -m ' + name:{width}}  {text}" for name, text in commands.items()
     ]
-    return "\n".join([*lines, "", "Each of them says more with --help."])
+    return "\n".join([*lines, "", "Each command explains its options with --help."])
 
 
 if __name__ == "__main__":

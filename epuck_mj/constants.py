@@ -145,13 +145,13 @@ PROXIMITY_PERIOD = 0.0159
 """Time in which all proximity sensors are read anew [s]. FIRMWARE."""
 
 PROXIMITY_PERIOD_2 = 0.010
-"""The same of the e-puck2 [s]. FIRMWARE2."""
+"""Time in which the e-puck2 reads all proximity sensors anew [s]. FIRMWARE2."""
 
 CALIBRATION_SAMPLES = 100
 """Samples of a sensor whose mean is its offset from then on. FIRMWARE."""
 
 CALIBRATION_TIME_MAX = 3.0
-"""A calibration that takes longer than this has failed [s].
+"""Time after which a calibration has failed [s].
 
 Estimated from the code (1 to 3 s); 100 samples alone take 1.6 s. FIRMWARE.
 """
@@ -160,13 +160,13 @@ MOTOR_TICK_RATE = 10_000
 """Ticks by which the motors' step periods are counted [1/s]. FIRMWARE."""
 
 MOTOR_TICK_RATE_2 = 50_000
-"""The same of the e-puck2: a timer of 100 kHz making half-steps [1/s]. FIRMWARE2."""
+"""Ticks of the e-puck2's motor timer: half-steps at 100 kHz [1/s]. FIRMWARE2."""
 
 COIL_TICKS = 15
 """Ticks for which a slow motor's coil is on at each step: 1.5 ms. FIRMWARE."""
 
 COIL_ALWAYS_ON = 601
-"""From this speed on the coils are never switched off [steps/s]. FIRMWARE."""
+"""Speed from which on the coils are never switched off [steps/s]. FIRMWARE."""
 
 STEP_RATE_MAX_2 = 1100
 """Highest wheel speed of the e-puck2's main processor [steps/s]. FIRMWARE2.
@@ -181,10 +181,10 @@ N_SELECTOR = 16
 """Positions of the selector. FIRMWARE."""
 
 BATTERY_LOW = 3.4
-"""Below this voltage the battery is reported as low [V]. FIRMWARE."""
+"""Voltage below which the battery is reported as low [V]. FIRMWARE."""
 
 BAUD_RATE = 115_200
-"""Of the robot's UART, 8 data bits, no parity, one stop bit [bit/s]. FIRMWARE."""
+"""Rate of the UART, with 8 data bits, no parity, one stop bit [bit/s]. FIRMWARE."""
 
 BYTE_TIME = 10 / BAUD_RATE
 """Time that one byte takes on the UART, start and stop bit included [s]."""
@@ -193,7 +193,7 @@ RECEIVE_RING = 64
 """Bytes the UART can keep for a firmware that is busy. FIRMWARE."""
 
 REPLY_TIME_MAX = 0.3
-"""A reply that takes longer than this over Bluetooth is lost [s].
+"""Time after which a reply over Bluetooth is lost [s].
 
 Never measured in public: chosen. Drivers wait for 0.1 to 1 s; comparable robots need
 60 ms a transaction, and occasionally several 100 ms.
@@ -218,16 +218,16 @@ WIFI_QUEUE = 5
 """Commands that may wait in the e-puck2's radio; further ones are dropped. WIFI2."""
 
 READING_AGE_MAX = 0.3
-"""A bridge whose latest reading is older than this stops its robot [s]. Chosen."""
+"""Age of the latest reading at which a bridge stops its robot [s]. Chosen."""
 
 CONNECT_TIME_MAX = 5.0
-"""A robot that has not answered for this long is none, or is gone [s].
+"""Time without an answer after which there is no robot [s].
 
 Chosen: longer than an e-puck takes to calibrate itself as it starts.
 """
 
 STOP_TIME_MAX = 5.0
-"""For so long a robot that does not say that it stopped is told again [s]. Chosen."""
+"""How long a robot is told to stop while it does not confirm [s]. Chosen."""
 
 STOP_REPLY_TIME = 0.2
-"""After this time without a word it is told to stop again [s]. Chosen."""
+"""Time without an answer after which a robot is told to stop again [s]. Chosen."""

@@ -1,8 +1,8 @@
-"""The one exception for what a user can put right."""
+"""The exception for everything that a user can correct."""
 
 
 class UserError(Exception):
-    """Bad input: says what was expected, what came and what is available.
+    """Bad input; the message says what was expected, what came, what is available.
 
     Command lines print it as one line and end with exit status 2.
     """

@@ -8,13 +8,13 @@ from epuck_mj.__main__ import listing
 
 COMMANDS = {
     "evolution.run": "evolve a controller, choose its champion, test it",
-    "evolution.replay": "watch champions: rerun viewer, web page, picture, video",
-    "evolution.evaluate": "test champions on fresh starts, in any arena",
-    "evolution.study": "many runs: experiments times seeds",
-    "evolution.report": "tables and figures of a study",
-    "evolution.gap": "what champions are worth in a hundred other worlds",
-    "evolution.reproduce": "the whole replication of the paper by one command",
-    "evolution.verify": "whether shipped champions score the same on this computer",
+    "evolution.replay": "watch champions in the rerun viewer, on a page, as video",
+    "evolution.evaluate": "test champions on new starts, in any arena",
+    "evolution.study": "do many runs: every experiment with every seed",
+    "evolution.report": "write tables and figures of a study",
+    "evolution.gap": "test champions in a hundred other worlds",
+    "evolution.reproduce": "repeat the paper's comparison in one command",
+    "evolution.verify": "test shipped champions again and compare the scores",
 }
 """Modules that are commands, and what each does."""
 

@@ -32,20 +32,20 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Options:
-    """Test champions on starts that evolution has never seen, and say what they do.
+    """Test champions on starts that evolution never used, and report their behaviour.
 
     Attributes:
-        paths: run or study directories, controller files, or wall-follower, the one
-            written by hand.
-        generations: instead of champions, the best individuals of these generations of
-            runs: numbers from 0 on and last, with commas in between.
-        starts: how many test starts: the first of always the same.
-        robot: robot to test on; the one it evolved on, and of the two shipped ones the
-            other, if not given.
-        arena: arena to test in; the one it evolved in if not given.
-        robots: what the robots are like; ideal if not given.
+        paths: run or study directories, controller files, or wall-follower, the
+            hand-written controller.
+        generations: test the best individuals of these generations instead of the
+            champions: numbers from 0 on, or last, separated by commas.
+        starts: number of test starts; always the first of the same sequence.
+        robot: robot to test on; if not given, the robot that the champion evolved on
+            and the other shipped robot.
+        arena: arena to test in; if not given, the one that the champion evolved in.
+        robots: noise and differences of the robots; ideal robots if not given.
         threads: threads that step the robots; 0 is one per core. Changes no result.
-        json: also write everything to this file.
+        json: JSON file to write all results to.
     """
 
     paths: tyro.conf.Positional[Annotated[tuple[str, ...], word("RUN")]]
@@ -98,7 +98,7 @@ def evaluate_policies(argv: Sequence[str]) -> int:
 
 
 def _described(test: HeldOut, steps: int) -> str:
-    """The outcome for a person, indented."""
+    """Indented lines with the scores of a policy."""
     low, high = test.interval
     metrics = test.metrics
     shares = sorted(test.behaviour.items(), key=lambda item: -item[1])

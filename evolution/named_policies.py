@@ -1,7 +1,7 @@
-"""Policies by the name a person gives: of a run, a study or a file, or wall-follower.
+"""Policies by name: a run, a study, a file, or wall-follower.
 
-What can be evaluated and replayed: champions, the best individuals of past generations,
-and the follower written by hand.
+Policies that can be evaluated and replayed are champions, the best individuals of
+earlier generations, and the hand-written wall follower.
 """
 
 import math
@@ -25,12 +25,12 @@ from evolution.settings.config_files import load_config
 from evolution.study.directory import champions
 
 LAST = "last"
-"""Name of the latest generation."""
+"""Word for the latest generation."""
 
 
 @dataclass(frozen=True)
 class NamedPolicy:
-    """A policy, and where it comes from.
+    """A policy with its origin.
 
     Attributes:
         source: path or name that a person gave it by.
@@ -56,12 +56,12 @@ class NamedPolicy:
 
     @property
     def conditions(self) -> Conditions:
-        """What the robots were like that it evolved on, ideal if nobody knows."""
+        """Conditions in which the policy evolved; ideal robots if unknown."""
         return self.config.conditions if self.config else Conditions()
 
     @property
     def name(self) -> str:
-        """What it is called beside others."""
+        """Name of the policy beside others."""
         return f"{self.source} {self.variant}".rstrip()
 
 
@@ -135,7 +135,7 @@ def _champion(path: Path, name: str, config: ExperimentConfig | None) -> NamedPo
 
 
 def _best_individuals(run: RunDirectory, generations: str) -> list[NamedPolicy]:
-    """The best individuals of those generations of a run, finished or not."""
+    """The best individuals of some generations of a run, which need not be finished."""
     path = run.best_individuals
     for file in (run.config, path):
         if not files.is_file(file):
@@ -170,7 +170,7 @@ def _best_individuals(run: RunDirectory, generations: str) -> list[NamedPolicy]:
 
 
 def _indices(generations: str, n: int) -> Iterator[int]:
-    """Numbers of generations, of which there are `n`."""
+    """Numbers of the `n` generations that a text names."""
     for word in generations.split(","):
         index = n - 1 if word.strip() == LAST else _number(word)
         if index is None or index >= n:
@@ -186,7 +186,7 @@ def _number(word: str) -> int | None:
 
 
 def described(policy: NamedPolicy) -> str:
-    """What is known of a policy, as Markdown."""
+    """Description of a policy in Markdown."""
     lines = [f"## {policy.name}", "", *_scores(policy.scores), ""]
     config = policy.config
     settings = config.to_yaml() if config else _plain(policy)
@@ -199,7 +199,7 @@ def _plain(policy: NamedPolicy) -> str:
 
 
 def _scores(scores: KnownScores) -> Iterator[str]:
-    """A line per score; of unknown ones nothing."""
+    """Lines of Markdown, one per known score."""
     for fitness, title in (
         (scores.stored, "Stored fitness, what evolution believed"),
         (scores.validation, "On validation starts, where the champion was chosen"),

@@ -1,7 +1,7 @@
-"""Score shipped champions again: `python -m evolution.verify results/paper/...`.
+"""Test shipped champions again: `python -m evolution.verify results/paper/...`.
 
-MuJoCo gives the same bits for one version on one type of processor only. Where the
-fitness differs, what else differs is named.
+MuJoCo gives the same bits only for one version on one type of processor. Where the
+fitness differs, differing versions and processors are printed.
 """
 
 import platform
@@ -39,12 +39,12 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Options:
-    """Score the champions of finished runs again and compare with what is written.
+    """Test the champions of finished runs again and compare with their stored scores.
 
-    Exit status 1 if one differs.
+    The exit status is 1 if a score differs.
 
     Attributes:
-        paths: run directories, or study directories for all their runs.
+        paths: run directories, or study directories to verify all their runs.
         threads: threads that step the robots; 0 is one per core. Changes no result.
     """
 
@@ -84,7 +84,7 @@ def _runs(path: Path) -> list[RunDirectory]:
 
 
 def _verified(run: RunDirectory, judges: "Judges") -> bool:
-    """Whether all scores are the same; says so, or what differs."""
+    """Verify a run and print the outcome; whether all scores are the same."""
     config, champion = run.stored_config(), load_controller(run.champion)
     scores = Scores.read(champion.scores, run.champion)
     differing = [
@@ -106,7 +106,7 @@ def _verified(run: RunDirectory, judges: "Judges") -> bool:
 def _differing(
     champion: ControllerFile, scores: Scores, config: ExperimentConfig, judges: "Judges"
 ) -> Iterator[str]:
-    """What of the champion's held-out evaluations is not what is written."""
+    """Differences between the champion's held-out tests and its stored scores."""
     for tests in (scores.held_out, scores.held_out_as_evolved):
         for robot, written in tests.items():
             n, met, where = written.starts, None, robot
@@ -133,7 +133,7 @@ def _differing(
 def _most_believed(
     run: RunDirectory, scores: Scores, config: ExperimentConfig, judges: "Judges"
 ) -> Iterator[str]:
-    """Whether the individual with the highest stored fitness has another fitness."""
+    """Differences in the fitness of the individual with the highest stored fitness."""
     written = scores.most_believed
     if written is None or not files.is_file(run.best_individuals):
         return
@@ -151,7 +151,7 @@ def _most_believed(
 def _edited(
     champion: ControllerFile, config: ExperimentConfig, judges: "Judges"
 ) -> Iterator[str]:
-    """Whether robot, arena or own parts have been edited since."""
+    """Texts about robot, arena and own parts that were edited since the run."""
     now = dict(judges.of(config.robot, config.setting).scene.sha256)
     if champion.origin.mjcf_sha256 != now:
         yield "its robot or arena has been edited since"
@@ -161,7 +161,7 @@ def _edited(
 
 
 def changes(provenance: dict) -> list[str]:
-    """Versions and processor that are not those of the run, a text each."""
+    """Versions and processor that differ from those of the run, a text each."""
     changes = []
     for package, before in provenance.get("versions", {}).items():
         now = _version(package)

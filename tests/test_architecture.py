@@ -24,6 +24,7 @@ ROOMS = {
         {"check", "view"},
         {"bridge"},
         {"calibrate"},
+        {"__main__"},
     ],
     "evolution": [
         {"search", "statistics"},
@@ -34,6 +35,7 @@ ROOMS = {
         {"named_policies", "pages"},
         {"evaluate", "gap", "replay", "report", "verify"},
         {"reproduce"},
+        {"__main__"},
     ],
 }
 """Each room imports from its own and from those above it here."""

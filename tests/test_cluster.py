@@ -437,7 +437,7 @@ def test_nobody_or_a_stranger_at_the_address(tmp_path, monkeypatch):
 )
 def test_what_is_no_address_is_refused_before_anything_is_written(address, tmp_path):
     output = tmp_path / "study"
-    with pytest.raises(UserError, match="expected as cluster tcp://host:8786") as info:
+    with pytest.raises(UserError, match="expected --cluster tcp://host:8786") as info:
         study(["quick", "--cluster", address, "--output", str(output)])
     assert str(info.value).endswith(f"got '{address}'")
     assert not output.exists()
@@ -506,7 +506,7 @@ def test_ctrl_c_ends_workers_of_its_own(preload, tmp_path):
         _, stderr = process.communicate(timeout=PATIENCE)
         assert process.returncode == 130
         assert len(stderr.splitlines()) == 1
-        assert stderr.startswith("Interrupted; go on with: ")
+        assert stderr.startswith("Interrupted; continue with: ")
 
         def nobody_left() -> bool:
             try:

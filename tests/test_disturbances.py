@@ -305,7 +305,7 @@ def test_what_makes_no_sense_is_refused():
     for keys, message in {
         "randomise: true": "^test: randomise needs noise: .* or strong, got none$",
         "calibration: {track: 0.05}": "calibration needs noise: calibrated or strong",
-        "calibration: {}, noise: strong, randomise: true": "got both: many robots or",
+        "calibration: {}, noise: strong, randomise: true": "got both",
         "calibration: {tracks: 0.05}": "calibration: unknown tracks; available: prox",
         "calibration: {track: -1}": "numbers above 0 and below 1 m, got -1",
         "calibration: {track: 53}": "numbers above 0 and below 1 m, got 53",

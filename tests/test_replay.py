@@ -328,7 +328,7 @@ def test_a_robots_own_trajectory_needs_no_simulation(here):
         ["--pose", "0", "0", "0"],
         ["--generations", "0"],
     ):
-        assert "expected a policy for --trials" in refused("robot.npz", *option)
+        assert "expected a policy with --trials" in refused("robot.npz", *option)
 
 
 def test_a_viewer_opens_where_there_is_a_display(champion, here, monkeypatch, capsys):
@@ -338,7 +338,7 @@ def test_a_viewer_opens_where_there_is_a_display(champion, here, monkeypatch, ca
     assert replay([champion]) == 0
     path = here / "run" / "replay.rrd"
     assert opened == [path]
-    assert capsys.readouterr().out.splitlines()[-1] == f"{path}, in the viewer"
+    assert capsys.readouterr().out.splitlines()[-1] == f"{path}, shown in the viewer"
     # not for those who want a file
     shown(champion)
     assert opened == [path]

@@ -125,7 +125,7 @@ def test_a_display_that_never_answers_holds_nobody_up(here, monkeypatch):
         try:
             result = process("champion.json")
             assert (result.returncode, result.stderr) == (0, "")
-            assert result.stdout.splitlines()[1:] == ["replay.rrd, in the viewer"]
+            assert result.stdout.splitlines()[1:] == ["replay.rrd, shown in the viewer"]
             # it lives on in a session of its own: Ctrl-C is not meant for it
             (shown,) = viewers(here / "replay.rrd")
             assert os.getsid(shown) == shown
@@ -160,7 +160,7 @@ def test_a_window_opens_on_a_display(here, monkeypatch):
             if "did not open" in line:
                 assert line.startswith("replay.rrd; ")
                 pytest.skip(f"no Vulkan driver for windows here: {line}")
-            assert line == "replay.rrd, in the viewer"
+            assert line == "replay.rrd, shown in the viewer"
             (shown,) = viewers(here / "replay.rrd")
             client = until(_client, PATIENCE)
             recording = until(lambda: client.get_state().active_recording, PATIENCE)

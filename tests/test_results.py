@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from epuck_mj.errors import UserError
 from epuck_mj.policies.file import load_controller
 from epuck_mj.scene.model_files import MODELS
 from evolution.gap.gap_document import gap_document, gap_summary
@@ -17,7 +18,7 @@ from evolution.judging.held_out import Judges
 from evolution.judging.scores import Scores
 from evolution.named_policies import named_policies
 from evolution.pages.blocks import to_markdown
-from evolution.reproduce.publish import shipped, with_tables
+from evolution.reproduce.publish import PAGES, pages_with_tables, shipped
 from evolution.run.directory import RunDirectory
 from evolution.study.config import StudyConfig, find_study
 from evolution.study.data import load_study
@@ -95,9 +96,18 @@ def test_a_shipped_champion_scores_the_same_on_this_machine():
     assert test == written or changes(run.provenance_fields())
 
 
-def test_the_readme_shows_what_is_shipped():
-    text = (ROOT / "README.md").read_text()
-    assert with_tables(text, RESULTS) == text
+def test_the_pages_show_what_is_shipped():
+    pages = pages_with_tables(ROOT)
+    assert set(pages) == {ROOT / name for name in PAGES}
+    for path, text in pages.items():
+        assert path.read_text() == text, path.name
+
+
+def test_a_page_without_its_markers_is_refused(tmp_path):
+    (tmp_path / "results").symlink_to(RESULTS)
+    (tmp_path / "README.md").write_text("no table")
+    with pytest.raises(UserError, match="expected '<!-- medians -->' and '<!-- end of"):
+        pages_with_tables(tmp_path)
 
 
 def test_what_is_shipped_is_small():

@@ -497,7 +497,10 @@ def test_a_bad_experiment_file_is_refused(content, words, refusal, here):
         (["ga", "--populaton", "3"], ("--populaton",)),
         (["ga", "--strategy", "best"], ("--strategy",)),
         (["ga", "de-best"], ("de-best",)),
-        (["--seed", "3", "ga"], ("experiment comes first", "evolution.run ga")),
+        (
+            ["--seed", "3", "ga"],
+            ("the experiment as the first argument", "evolution.run ga"),
+        ),
         (["ga", "--seed", "x"], ("--seed", "'x'")),
         (["ga", "--seed", "-1"], ("seed", "-1")),
         (["ga", "--seed"], ("--seed",)),
@@ -651,7 +654,7 @@ def resume_command(stderr: str) -> list[str]:
     """The arguments that the last line tells a person to type."""
     line = stderr.splitlines()[-1]
     match = re.fullmatch(
-        r"Interrupted after ([\d,]+) evaluations; go on with: (.*)", line
+        r"Interrupted after ([\d,]+) evaluations; continue with: (.*)", line
     )
     assert match, stderr
     python, dash_m, module, *argv = shlex.split(match[2])

@@ -545,7 +545,7 @@ def test_a_signal_ends_all_and_says_how_to_go_on(
         assert not any(map(command_line, children))
     assert process.returncode == status
     assert stdout == ""
-    match = re.fullmatch(r"Interrupted; go on with: (.*)\n", stderr)
+    match = re.fullmatch(r"Interrupted; continue with: (.*)\n", stderr)
     assert match, stderr
     python, *arguments = shlex.split(match[1])
     assert Path(python).name.startswith("python")

@@ -31,22 +31,21 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Options:
-    """Let a controller drive a real e-puck, and stop it whatever happens.
+    """Let a controller drive a real e-puck, and stop the robot at the end.
 
     Attributes:
-        champion: controller file, or wall-follower, the one written by hand.
-        port: of the robot: /dev/rfcomm0, COM5, socket://host:port; of an e-puck2 over
-            WiFi tcp://host:1000.
-        seconds: how long it drives [s].
+        champion: controller file, or wall-follower, the hand-written controller.
+        port: port of the robot: /dev/rfcomm0, COM5 or socket://host:port; for an
+            e-puck2 over WiFi tcp://host:1000.
+        seconds: duration of the drive [s].
         calibrate: first let the robot set its sensors' zero; nothing may be near it.
-        calibration: file of python -m epuck_mj.calibrate: in what this robot differs
-            from others.
-        pose: where it starts, x and y [m] and direction [degrees], for the log.
-        max_speed: no wheel rolls faster than this [m/s]; if not given, as fast as any.
-        dry_run: read and decide, but let the robot stand still.
-        arena: to show the log in; the one the champion evolved in if not given.
-        log: name of the log, written as .npz and .rrd; in runs/ if not given.
-        list_ports: only list the serial ports of this computer.
+        calibration: file written by python -m epuck_mj.calibrate for this robot.
+        pose: start of the robot in the log: x and y [m] and heading [degrees].
+        max_speed: highest speed of a wheel [m/s]; the robot's own limit if not given.
+        dry_run: read the sensors and compute commands, but do not move.
+        arena: arena to show the log in; if not given, the one the champion evolved in.
+        log: name of the log, written as .npz and .rrd; a name in runs/ if not given.
+        list_ports: list the serial ports of this computer and exit.
     """
 
     champion: tyro.conf.Positional[Annotated[str, word("RUN")]] = ""
@@ -97,7 +96,7 @@ def _refuse_bad_options(options: Options) -> None:
     if not options.champion:
         raise UserError(f"expected a controller file or {YARDSTICK}")
     if not options.port:
-        raise UserError("expected --port; --list-ports shows what there is")
+        raise UserError("expected --port; --list-ports lists the ports there are")
     if not 0 < options.seconds <= SECONDS_MAX:
         raise UserError(
             f"expected --seconds above 0, up to {SECONDS_MAX}, got {options.seconds}"
@@ -112,7 +111,7 @@ def _refuse_bad_options(options: Options) -> None:
 
 
 def _champion(name: str) -> tuple[Policy, TaskParameters, str, str]:
-    """A policy, its task, the robot and arena it is for."""
+    """Policy, task, robot and arena of a champion."""
     if name == YARDSTICK:
         return WallFollower(), TaskParameters(), "epuck", "arena"
     file = load_controller(name)

@@ -1,4 +1,4 @@
-"""What goes wrong between a host and its robot."""
+"""Failures between a host and its robot."""
 
 from epuck_mj.errors import UserError
 
@@ -10,16 +10,16 @@ Beside 2 for what a user can put right before it starts, and 128 + signal.
 
 
 class BridgeError(UserError):
-    """Not what was expected of the robot, or of what it is told."""
+    """An unexpected reply of the robot, or an invalid request to it."""
 
     def __init__(self, expected: str, came: str | bytes) -> None:
-        """Say what was expected and what came; long bytes are shortened."""
+        """Store what was expected and what came; long bytes are shortened."""
         text = came if isinstance(came, str) else _shown(came)
         super().__init__(f"expected {expected}; came {text}")
 
 
 class RobotRestarted(BridgeError):
-    """The robot greets as it does after a reset, which nobody asked for.
+    """The robot sent its banner: it was reset unexpectedly.
 
     Its motors stand still, its step counters are zero, its calibration is lost.
     """
@@ -30,19 +30,19 @@ class NoReply(BridgeError):
 
 
 class LinkLost(BridgeError):
-    """The port is gone: nobody hears us any more."""
+    """The port is gone."""
 
 
 class StaleReading(BridgeError):
-    """Nobody knows what the robot senses now: it must not go on."""
+    """The latest reading is too old: the robot must be stopped."""
 
 
 class StillMoving(BridgeError):
-    """The robot never said that it stopped."""
+    """The robot did not confirm that it stopped."""
 
 
 def _shown(came: bytes, limit: int = 60) -> str:
-    """Bytes as a person reads them, the first `limit` of them."""
+    """Readable text of the first `limit` bytes."""
     if len(came) <= limit:
         return repr(came)
     return f"{came[:limit]!r} and {len(came) - limit} bytes more"

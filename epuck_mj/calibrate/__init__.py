@@ -1,6 +1,6 @@
 """Calibration of one robot: `python -m epuck_mj.calibrate --port PORT`.
 
-- `fitting`: from what was measured to gains, wheel radii and track; numbers only;
-- `bench`: the robot drives and is read, through the bridge and as safe as there;
-- `guide`: tells a person what to do and asks what the ruler says.
+- `fitting`: gains, wheel radii and track computed from measurements;
+- `bench`: drives and readings of the robot, as safe as the bridge's;
+- `guide`: instructions and questions to the person with the ruler.
 """

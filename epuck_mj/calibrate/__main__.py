@@ -1,4 +1,4 @@
-"""A robot is calibrated: `python -m epuck_mj.calibrate --port PORT`."""
+"""Calibrate a robot: `python -m epuck_mj.calibrate --port PORT`."""
 
 import sys
 import time
@@ -29,14 +29,14 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Options:
-    """Measure in what a robot differs from the robot of the books, step by step.
+    """Measure how a robot differs from the nominal robot, step by step.
 
-    Needs a ruler, a protractor, a flat wall and spacers of 10, 20 and 30 mm.
+    You need a ruler, a protractor, a flat wall and spacers of 10, 20 and 30 mm.
 
     Attributes:
-        port: of the robot, as for the bridge.
-        output: file to write; what is in it and is not measured now stays.
-        only: the one step to do, instead of straight, turn and sensors.
+        port: port of the robot, as for the bridge.
+        output: file to write; values in it that are not measured now stay.
+        only: do only this step, instead of straight, turn and sensors.
     """
 
     port: Annotated[str, word("PORT")] = ""
@@ -66,7 +66,7 @@ def calibrate_robot(
     clock: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> int:
-    """Calibrate, writing the file after each step; the exit status, as the bridge's.
+    """Calibrate and write the file after each step; the exit status, as the bridge's.
 
     Args:
         steps: names of STEPS.

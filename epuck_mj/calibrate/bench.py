@@ -1,7 +1,7 @@
-"""A robot drives a little and is read, through the bridge and as safe as there.
+"""Drives and readings of a robot for its calibration, as safe as the bridge's.
 
-Each drive has the connection to itself: it opens it, sees that the robot stands,
-drives, stops it whatever happened, and lets go. While a person is at the robot, nobody
+Each drive opens the connection, makes sure that the robot stands, drives, stops the
+robot in any case, and closes the connection. While a person is at the robot, no program
 is connected to it.
 """
 
@@ -29,10 +29,10 @@ A little more than PROXIMITY_PERIOD: more readings would tell the same again.
 """
 
 RATE = 300
-"""Speed of the wheels where only the way counts [steps/s]."""
+"""Speed of the wheels in drives without sensor readings [steps/s]."""
 
 N_STEPS = 4000
-"""Steps straight on: 0.52 m, of which a ruler's millimetre is 0.2 %."""
+"""Steps of the straight drive: 0.52 m, of which 1 mm is 0.2 %."""
 
 N_TURNS = 3
 """Turns on the spot, of which one degree is 0.1 %."""
@@ -44,18 +44,18 @@ MORE_THAN_A_TURN = 1.1
 """Turns while the sensors are read, as far as the track is known."""
 
 N_LOOKS = 10
-"""Readings by which the link's pace is judged."""
+"""Number of readings that measure the link's pace."""
 
 N_REST = 5
-"""Readings of a robot that was told to stand, until its counters are at rest."""
+"""Number of readings after which a stopped robot's counters are at rest."""
 
 SPARE_TIME = 5.0
-"""A drive that takes twice its time and this [s] more has failed. Chosen."""
+"""Extra time after which a drive of twice its time has failed [s]. Chosen."""
 
 
 @dataclass(frozen=True)
 class Bench:
-    """How to reach the robot.
+    """Connection settings of the robot to calibrate.
 
     Attributes:
         connect: opens the way to it.
@@ -70,7 +70,7 @@ class Bench:
     sleep: Callable[[float], None]
 
     def with_robot(self, calibration: Calibration, job: Callable[[RealRobot], T]) -> T:
-        """What a job gives; then the robot stands, and said so.
+        """Connect, do a job, and stop the robot; the job's result.
 
         Args:
             calibration: what is known of the robot.
@@ -98,7 +98,7 @@ class Bench:
 
 
 def zero(bench: Bench, calibration: Calibration) -> None:
-    """Let the sensors read zero for what they see now."""
+    """Set the sensors' zero to what they see now."""
     bench.with_robot(calibration, RealRobot.calibrate)
 
 

@@ -1,6 +1,6 @@
-"""From what was measured to a robot's sensor gains, wheel radii and track.
+"""Fitting: sensor gains, wheel radii and track from measurements.
 
-What no e-puck has is refused: then something was measured wrongly.
+Values that no e-puck has are refused, since a measurement must be wrong.
 """
 
 import math
@@ -28,13 +28,13 @@ SIDES = ("left", "right")
 """The wheels in their order."""
 
 SATURATED = 3700
-"""Counts from which a sensor says nothing of the distance.
+"""Counts from which a sensor is saturated.
 
 Chosen: sensors that touch a wall read 3775 to 3863. JBOTEVOLVER.
 """
 
 FLOOR_MAX = 30
-"""Counts of a sensor that sees nothing, if its zero is set. Chosen."""
+"""Most counts of a sensor that sees nothing, if its zero is set. Chosen."""
 
 WINDOW = math.radians(6)
 """Turn in which a sensor faces a wall squarely [rad].
@@ -48,7 +48,7 @@ N_READINGS = 3
 
 @dataclass(frozen=True, eq=False)
 class SensorFit:
-    """How the sensors differ from the mean one.
+    """Gains and residuals of the sensors, against the mean sensor.
 
     Attributes:
         gains: of each sensor, `(8,)`.
@@ -131,7 +131,7 @@ def fit_gains(clearances: np.ndarray, counts: np.ndarray) -> SensorFit:
 def fit_wheel_radii(
     steps: float, forward: float, left: float, track: float
 ) -> tuple[float, float]:
-    """Radii on which the robot rolls, left and right [m]: if they differ, on an arc.
+    """Radii of the left and the right wheel [m], from a straight drive.
 
     The front, which is what a person sees, is a body's radius ahead of the axle: if the
     robot turned by `a`, it lies `tan(a / 2) = left / (forward + 2 BODY_RADIUS)` aside.
@@ -196,7 +196,7 @@ def _refuse_outside(
 
 
 def _refuse_high_floor(floor: np.ndarray) -> None:
-    """Refuse sensors that see something where there is nothing."""
+    """Refuse counts that are too high away from the wall."""
     if floor.max() > FLOOR_MAX:
         raise UserError(
             f"expected up to {FLOOR_MAX} counts away from the wall, "

@@ -1,4 +1,4 @@
-"""What a person is told to do, and asked, while a robot is calibrated."""
+"""Guide: instructions and questions to the person who calibrates a robot."""
 
 import math
 from collections.abc import Callable
@@ -32,26 +32,26 @@ from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.motors import STEP_ANGLE
 
 CLEARANCES = (0.010, 0.020, 0.030)
-"""Clearances from shell to wall [m], where sensors are good, and do not saturate."""
+"""Clearances from shell to wall of the sensor readings [m]."""
 
 RESIDUAL_MAX = 0.25
-"""Residual above which a sensor is worth a word. Chosen."""
+"""Residual above which a sensor gets a warning. Chosen."""
 
 LENGTHS = (0.05, 2.0)
-"""Ways that a ruler can have shown [m]; others are taken for slips of the pen."""
+"""Plausible lengths of the straight drive [m]; others are asked for again."""
 
 DRIFTS = (-150.0, 150.0)
-"""Ways to the left that a ruler can have shown [mm]: wheels that differ by 5 %."""
+"""Plausible drifts to the left [mm]: wheels that differ by 5 %."""
 
 MISSES = (-360.0, 360.0)
-"""Angles that a protractor can have shown [degrees]."""
+"""Plausible angles by which a turn misses [degrees]."""
 
 
 class Person:
-    """Who is at the robot; UserError says that nobody answers any more."""
+    """Person at the robot; UserError says that the input has ended."""
 
     def __init__(self, ask: Callable[[str], str], interruption: Interruption) -> None:
-        """A person who was asked nothing yet.
+        """Start without a question asked.
 
         Args:
             ask: shows a question and gives the answer, as `input` does.
@@ -61,11 +61,11 @@ class Person:
         self._interruption = interruption
 
     def ready(self, what: str) -> None:
-        """Wait until something is done."""
+        """Ask for something to be done and wait for Enter."""
         self._answer(f"{what}\nThen press Enter: ")
 
     def agrees(self, question: str) -> bool:
-        """Whether the person says yes; asked again until it is yes or no."""
+        """Ask until the answer is yes or no; whether it is yes."""
         while True:
             answer = self._answer(f"{question} [y/n]: ").lower()
             if answer in ("y", "yes", "n", "no"):
@@ -73,7 +73,7 @@ class Person:
             _say(f"expected y or n, got '{answer}'")
 
     def number(self, question: str, low: float, high: float) -> float:
-        """A number within limits; asked again until there is one."""
+        """Ask until the answer is a number within limits; that number."""
         while True:
             answer = self._answer(f"{question}: ")
             try:
@@ -100,7 +100,7 @@ class Person:
 def measure_wheel_radii(
     bench: Bench, person: Person, known: Calibration
 ) -> Calibration:
-    """What is known, with the wheel radii by a ruler."""
+    """The calibration with wheel radii measured by a ruler."""
     step_length = STEP_ANGLE * known.wheel_radius
     _say("\nWheel radii: the robot drives straight on, you measure where it gets.")
     clear = N_STEPS * step_length + 0.15
@@ -119,7 +119,7 @@ def measure_wheel_radii(
 
 
 def measure_track(bench: Bench, person: Person, known: Calibration) -> Calibration:
-    """What is known, with the track by a protractor."""
+    """The calibration with the track measured by a protractor."""
     _say(
         f"\nTrack: the robot turns {N_TURNS} times to the left, on the spot;\n"
         "you measure by how much its front misses where it was."
@@ -144,7 +144,7 @@ def measure_track(bench: Bench, person: Person, known: Calibration) -> Calibrati
 
 
 def measure_gains(bench: Bench, person: Person, known: Calibration) -> Calibration:
-    """What is known, with the gains of the proximity sensors."""
+    """The calibration with the measured gains of the proximity sensors."""
     _say("\nSensors: the robot turns slowly on the spot, at several distances")
     _say("from a flat wall which is 20 cm long or longer.")
     if person.agrees("Set the sensors' zero? They forget it when switched off"):
@@ -166,7 +166,7 @@ def measure_gains(bench: Bench, person: Person, known: Calibration) -> Calibrati
 
 
 def table(counts: np.ndarray, fit: SensorFit) -> str:
-    """Peaks, gains and residuals, a sensor a line, and what to think of them.
+    """Table of peaks, gains and residuals of the sensors, with warnings.
 
     Args:
         counts: peaks at CLEARANCES, `(distances, 8)`.
@@ -208,4 +208,4 @@ STEPS = {
     "turn": measure_track,
     "sensors": measure_gains,
 }
-"""The steps of a calibration, in the order in which each is of use to the next."""
+"""Steps of a calibration, in order."""

@@ -1,1 +1,1 @@
-"""What is in an arena, and what is wrong with it: `python -m epuck_mj.check my.xml`."""
+"""Checks of an arena: `python -m epuck_mj.check my.xml`."""

@@ -1,4 +1,4 @@
-"""`python -m epuck_mj.check ARENA`: what is there, and what is wrong.
+"""Check an arena: `python -m epuck_mj.check ARENA`.
 
 Exit status 0 if the arena is usable, 1 if errors were found in it, and 2, as for all
 command lines here, if there is no arena to look at: bad options, no file, no text.
@@ -22,21 +22,21 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Options:
-    """Check an arena: walls, room, sensors, contacts, speed.
+    """Check an arena: walls, free space, sensors, contacts and speed.
 
-    Exit status 1 if it cannot be used.
+    The exit status is 1 if the arena cannot be used.
     """
 
     arena: tyro.conf.Positional[Annotated[str, word("ARENA")]]
-    """name of a shipped arena, or path of an MJCF"""
+    """name of a shipped arena, or path of an MJCF file"""
     robot: Annotated[str | None, word("ROBOT")] = None
-    """name of a shipped robot, or path of an MJCF; both shipped ones by default"""
+    """name of a shipped robot, or path of an MJCF file; both shipped ones by default"""
     picture: Annotated[Path | None, word("FILE")] = None
-    """PNG to write: the walls from above, and where robots may start"""
+    """PNG file to draw the walls and the free space to, seen from above"""
 
 
 def check(argv: Sequence[str]) -> int:
-    """Check and print; the exit status."""
+    """Check an arena and print the findings; the exit status."""
     options = parse(Options, "python -m epuck_mj.check", argv, examples=EXAMPLES)
     # physics and pictures are for a command that makes sense
     from epuck_mj.check import report

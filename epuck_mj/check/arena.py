@@ -1,6 +1,6 @@
-"""What an arena's author wants to know: what is there, and what is wrong with it.
+"""Check of an arena: its contents and its faults.
 
-Every part looks at a scene and returns findings; only `report` makes text of them, and
+Each part examines a scene and returns findings. Only `report` makes text of them, and
 only `__main__` prints.
 """
 
@@ -24,18 +24,18 @@ from epuck_mj.scene.starts import FreeSpace, Grid, survey
 from epuck_mj.step.control import START_CLEARANCE
 
 SUBSTEPS_MAX = 10_000
-"""Most physics steps in a control step: nobody would wait for more."""
+"""Most physics steps in a control step."""
 
 N_STARTS = 8
-"""At how many starts a robot is left alone."""
+"""Number of starts at which a robot is left at rest."""
 
 SEED = 0
-"""Of these starts."""
+"""Seed of the starts at which a robot is left at rest."""
 
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What was found in an arena.
+    """Findings of a check, with the scene and the free space.
 
     Attributes:
         arena: path of its MJCF.
@@ -51,7 +51,7 @@ class Report:
 
 
 def check_arena(arena: str, robots: Sequence[str]) -> Report:
-    """Put each robot into an arena and look at everything.
+    """Check an arena with each robot.
 
     Args:
         arena: name of a shipped arena, or path of an MJCF.
@@ -73,7 +73,7 @@ def check_arena(arena: str, robots: Sequence[str]) -> Report:
 
 
 def _check(arena: Path, robot: str) -> Report:
-    """Everything about an arena with one robot, as far as one gets."""
+    """Findings about an arena with one robot, as far as they can be made."""
     findings: list[Finding] = []
     scene = grid = None
     try:
@@ -93,7 +93,7 @@ def _check(arena: Path, robot: str) -> Report:
 
 
 def _scene(source: Source, robot: str) -> Scene:
-    """The scene, if there can be one.
+    """The scene, if it can be compiled.
 
     Raises:
         Unusable: if not.
@@ -112,7 +112,7 @@ def _scene(source: Source, robot: str) -> Scene:
 
 
 def _grid(scene: Scene) -> Grid:
-    """Where the robot fits.
+    """Grid of the places where the robot fits.
 
     Raises:
         Unusable: if there are no walls.
@@ -126,7 +126,7 @@ def _grid(scene: Scene) -> Grid:
 def _robot_findings(
     scene: Scene, robot: str, source: Source, places: tuple[Place, ...]
 ) -> list[Finding]:
-    """What a robot does at starts in an arena that has some."""
+    """Findings about a robot at starts, if the arena has any."""
     topic = f"robot {Path(robot).name}"
     rng = np.random.default_rng(SEED)
     starts = FreeSpace(scene, START_CLEARANCE).sample(rng, N_STARTS)

@@ -1,4 +1,4 @@
-"""Robots left alone at starts: what they touch, and whether they stay."""
+"""Robots at rest at starts: what they touch, and whether they stay."""
 
 from dataclasses import dataclass
 
@@ -10,21 +10,21 @@ from epuck_mj.scene.model import Scene
 from epuck_mj.scene.robot_parts import ROBOT_BODY
 
 SETTLING = 1.0
-"""How long a robot is left alone [s]."""
+"""How long a robot is left at rest [s]."""
 
 STEPS_MAX = 5000
-"""Most physics steps for it."""
+"""Most physics steps for which a robot is left at rest."""
 
 MOVED_MAX = 0.001
-"""How far it may move meanwhile, in any direction [m]."""
+"""How far a robot at rest may move, in any direction [m]."""
 
 DEPTH_MAX = 0.001
-"""How deep what touches may sink in [m]."""
+"""How deep geoms that touch may sink into each other [m]."""
 
 
 @dataclass(frozen=True)
 class Rest:
-    """A robot that was left alone.
+    """Result of leaving a robot at rest.
 
     Attributes:
         touching: pairs of geoms that touch, the robot's own among them.
@@ -40,7 +40,7 @@ class Rest:
 
 
 def settle(scene: Scene, start: np.ndarray) -> Rest:
-    """What becomes of a robot on a start `(3,)` that nobody commands."""
+    """Simulate a robot without commands on a start `(3,)`."""
     model, data = scene.model, mujoco.MjData(scene.model)
     robot = model.body(ROBOT_BODY).id
     data.qpos[:] = scene.qpos(start)
@@ -65,7 +65,7 @@ def settle(scene: Scene, start: np.ndarray) -> Rest:
 def rest_findings(
     scene: Scene, starts: np.ndarray, topic: str, places: tuple[Place, ...]
 ) -> list[Finding]:
-    """What robots touch that were left alone on starts `(n, 3)`."""
+    """Findings about robots left at rest on starts `(n, 3)`."""
     rests = [settle(scene, start) for start in starts]
     place = Place(scene.arena)
     pairs = frozenset[tuple[int, int]]().union(*(rest.touching for rest in rests))

@@ -1,4 +1,4 @@
-"""What a check finds: a plain line, how bad it is, and where in the XML it is from."""
+"""Findings of a check: a line of text, its severity, and its place in the XML."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -13,14 +13,14 @@ class Severity(StrEnum):
     ERROR = "error"
     """The arena cannot be used as it is."""
     WARNING = "warning"
-    """It can, but something is probably not as it was meant."""
+    """The arena can be used, but something is probably wrong."""
     INFO = "info"
-    """What is there."""
+    """Information about the arena."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where something was written.
+    """File and line of an element.
 
     Attributes:
         file: path of the XML.
@@ -51,24 +51,24 @@ class Finding:
 
 
 def info(topic: str, text: str) -> Finding:
-    """What is there."""
+    """A finding that informs about the arena."""
     return Finding(topic, Severity.INFO, text)
 
 
 def warning(topic: str, text: str, place: Place | None) -> Finding:
-    """What is probably not as it was meant."""
+    """A finding about something that is probably wrong."""
     return Finding(topic, Severity.WARNING, text, place)
 
 
 def error(topic: str, text: str, place: Place | None) -> Finding:
-    """What makes an arena useless."""
+    """A finding with which the arena cannot be used."""
     return Finding(topic, Severity.ERROR, text, place)
 
 
 class Unusable(UserError):
-    """An error that leaves nothing else to check."""
+    """An error after which nothing else can be checked."""
 
     def __init__(self, finding: Finding):
-        """Stop with that finding."""
+        """Store the finding."""
         super().__init__(finding.text)
         self.finding = finding

@@ -1,4 +1,4 @@
-"""A robot's sensors and actuators, with what they read at a start."""
+"""Findings about a robot's sensors and actuators at a start."""
 
 import mujoco
 import numpy as np
@@ -16,11 +16,11 @@ UNITS = {
     _SENSOR.mjSENS_VELOCIMETER: " m/s",
     _SENSOR.mjSENS_ACCELEROMETER: " m/s^2",
 }
-"""Units of the sensors that a robot may well have."""
+"""Units of common kinds of sensors."""
 
 
 def part_findings(scene: Scene, start: np.ndarray, topic: str) -> list[Finding]:
-    """What the robot senses and what drives it, at rest on a start `(3,)`."""
+    """Sensor values and actuators of a robot at rest on a start `(3,)`."""
     model, data = scene.model, mujoco.MjData(scene.model)
     data.qpos[:] = scene.qpos(start)
     mujoco.mj_forward(model, data)
@@ -54,7 +54,7 @@ def part_findings(scene: Scene, start: np.ndarray, topic: str) -> list[Finding]:
 
 
 def _shown(kind: int, values: np.ndarray) -> str:
-    """What a sensor reads."""
+    """A sensor's value as text."""
     if kind == _SENSOR.mjSENS_RANGEFINDER and values[0] < 0:
         return "nothing"
     digits = 0 if kind == _SENSOR.mjSENS_CONTACT else 3

@@ -15,7 +15,7 @@ WALL = "0.45"
 
 
 def region_figure(scene: Scene, grid: Grid, title: str) -> Figure:
-    """Walls, and the free region that they enclose, or what leaks out if none is.
+    """Figure of walls and the free region, or of the leak if no region is enclosed.
 
     Args:
         scene: robot and arena.

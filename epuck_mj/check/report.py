@@ -1,4 +1,4 @@
-"""How findings are printed: as plain lines under headings, errors last."""
+"""Findings as printed lines under headings, errors last."""
 
 import os
 import textwrap
@@ -13,7 +13,7 @@ PLURALS = {Severity.ERROR: "errors", Severity.WARNING: "warnings"}
 
 
 def lines(arena: Path, findings: Sequence[Finding]) -> Iterator[str]:
-    """What is there, by topic; then what is wrong, a line each; then the outcome."""
+    """Lines with information by topic, then warnings and errors, then the outcome."""
     there = [finding for finding in findings if finding.severity is Severity.INFO]
     for topic in dict.fromkeys(finding.topic for finding in there):
         yield topic
@@ -33,7 +33,7 @@ def usable(findings: Sequence[Finding]) -> bool:
 
 
 def _wrapped(text: str) -> list[str]:
-    """An indented paragraph."""
+    """Lines of an indented paragraph."""
     return textwrap.wrap(
         text,
         WIDTH,
@@ -45,7 +45,7 @@ def _wrapped(text: str) -> list[str]:
 
 
 def _wrong(finding: Finding) -> str:
-    """One line as compilers write it, so that editors find the place."""
+    """A warning or an error with its file and line, as compilers write it."""
     if finding.place is None:
         return f"{finding.severity}: {finding.topic}: {finding.text}"
     element = finding.place.element
@@ -58,7 +58,7 @@ def _where(place: Place) -> str:
 
 
 def _shown(path: Path) -> str:
-    """A path as a person here would type it."""
+    """A path as one would type it in the working directory."""
     near = os.path.relpath(path)
     return str(path) if near.startswith("..") else near
 

@@ -1,4 +1,4 @@
-"""Where a robot may start, and why it may not."""
+"""Findings about where a robot may start."""
 
 import math
 
@@ -15,10 +15,10 @@ from epuck_mj.step.control import START_CLEARANCE
 
 TOPIC = "room"
 SAMPLE = 64
-"""Starts drawn to see whether any can be."""
+"""Number of starts drawn to test whether starts can be drawn."""
 
 LEAK_TOLERANCE = 0.01
-"""Share of the grid that a leak may differ by for two clearances and be the same."""
+"""Share of the grid by which equal leaks may differ between two clearances."""
 
 
 def room_findings(scene: Scene, grid: Grid) -> list[Finding]:
@@ -52,7 +52,7 @@ def room_findings(scene: Scene, grid: Grid) -> list[Finding]:
 
 
 def _why_none(scene: Scene, grid: Grid) -> str:
-    """Why no free node is enclosed: a gap in the walls, or no room between them."""
+    """Finding why no free node is enclosed: a gap in the walls, or no room."""
     try:
         poses = np.zeros((*grid.free.shape, 3))
         poses[..., :2] = grid.nodes
@@ -77,7 +77,7 @@ def _why_none(scene: Scene, grid: Grid) -> str:
 
 
 def _gap(grid: Grid, distance: np.ndarray) -> tuple[float, np.ndarray] | None:
-    """How far one can be from walls and still leave, and where `(2,)`.
+    """Largest clearance of a way out through the walls, and its place `(2,)`.
 
     The more clearance a robot keeps, the fewer gaps it fits through. The one to the
     outside is shut at the least clearance with which the outside gets no farther in.
@@ -112,7 +112,7 @@ def _gap(grid: Grid, distance: np.ndarray) -> tuple[float, np.ndarray] | None:
 
 
 def _leak(grid: Grid, distance: np.ndarray, level: float) -> int:
-    """How many nodes of the box around the walls one reaches from outside.
+    """Number of nodes of the box around the walls that can be reached from outside.
 
     With the clearance `level`; the robot's whole disc counts.
     """

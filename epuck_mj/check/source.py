@@ -1,4 +1,4 @@
-"""Where each geom was written: an arena's XML, its includes and its robot as one text.
+"""Source of a scene: the XML of arena, includes and robot as one text.
 
 MuJoCo names the line of an element, but not for files that are included. So elements
 are written into a single text, one a line, and a table says where each came from.
@@ -161,7 +161,7 @@ class _Text:
 
 
 def _shown(tag: str, attributes: Mapping[str, str]) -> str:
-    """An element with what tells it from others."""
+    """An element's tag with its name or other attribute."""
     for key in ("name", "file", "class"):
         if key in attributes:
             return f'<{tag} {key}="{attributes[key]}">'
@@ -169,7 +169,7 @@ def _shown(tag: str, attributes: Mapping[str, str]) -> str:
 
 
 def _included(element: Element, arena: Path) -> str:
-    """Name of the file that an include names, if it is there."""
+    """Name of the file that an include names, if the attribute is there."""
     name = element.attributes.get("file", "")
     path = arena.parent / name
     if path.name not in SHIPPED_ROBOTS and not is_file(path):

@@ -1,4 +1,4 @@
-"""How fast a scene runs here and now."""
+"""Measurement of a scene's speed on this computer."""
 
 import time
 from collections.abc import Iterator
@@ -61,13 +61,13 @@ def speed_findings(
 
 
 def _has_step(model: mujoco.MjModel) -> bool:
-    """Whether the robot brings a physics step of its own."""
+    """Whether the robot has a physics step of its own."""
     kind = mujoco.mjtObj.mjOBJ_NUMERIC.value
     return mujoco.mj_name2id(model, kind, TIMESTEP) >= 0
 
 
 def _standing(scene: Scene, start: np.ndarray) -> Iterator[None]:
-    """Control steps of a robot that is told to stand still, for ever."""
+    """Endless control steps of a robot that is told to stand still."""
     robots = robots_in(scene, 1, 1)
     robots.reset(start[None])
     while True:
@@ -78,14 +78,14 @@ def _standing(scene: Scene, start: np.ndarray) -> Iterator[None]:
 def _driving(
     scene: Scene, start: np.ndarray, task: TaskParameters
 ) -> Iterator[ControlStep]:
-    """Control steps of a robot with a controller, for ever."""
+    """Endless control steps of a robot with a controller."""
     robots, policy = robots_in(scene, 1, 1), WallFollower()
     while True:
         yield from drive(robots, policy, robots.reset(start[None]), task)
 
 
 def _rates(steps: Iterator[object]) -> tuple[float, float]:
-    """How many steps are done per second, and per second of CPU time."""
+    """Steps per second, and per second of CPU time."""
     start, cpu, n = time.perf_counter(), time.process_time(), 0
     while (elapsed := time.perf_counter() - start) < MEASURED:
         next(steps)

@@ -1,4 +1,4 @@
-"""What stands in an arena, and whether rays see what the robot can hit.
+"""Findings about walls, and whether rays see what the robot can hit.
 
 MuJoCo's rangefinders look for geoms of any group and any collision bits. They pass
 through those of alpha 0, where a material's alpha counts before the geom's own.
@@ -24,7 +24,7 @@ NAMES_MAX = 6
 FLOOR_BITS = 'contype="2" conaffinity="2"'
 
 FAR = 1e4
-"""Farther away than any wall [m]."""
+"""Distance beyond any wall [m]."""
 
 CONCAVE = 0.01
 """Share of a hull's volume that its mesh may leave empty and still count as convex."""
@@ -41,7 +41,7 @@ class Heights:
 
 
 def finite_findings(model: mujoco.MjModel, places: tuple[Place, ...]) -> list[Finding]:
-    """Geoms that are nowhere: with them, nothing can be measured."""
+    """Errors for geoms at infinite or very distant places."""
     data = at_rest(model)
     values = np.concatenate([data.geom_xpos, data.geom_xmat, model.geom_size], axis=1)
     nowhere = ~(np.abs(values) < FAR).all(axis=1)
@@ -52,7 +52,7 @@ def finite_findings(model: mujoco.MjModel, places: tuple[Place, ...]) -> list[Fi
 
 
 def plane_findings(model: mujoco.MjModel, places: tuple[Place, ...]) -> list[Finding]:
-    """Planes that the shell would hit: no scene can be made with them."""
+    """Errors for planes that the shell would hit."""
     planes = (model.geom_type == _SHAPE.mjGEOM_PLANE) & walls(model)
     data = at_rest(model)
     return [
@@ -68,7 +68,7 @@ def plane_findings(model: mujoco.MjModel, places: tuple[Place, ...]) -> list[Fin
 
 
 def wall_findings(scene: Scene, places: tuple[Place, ...]) -> list[Finding]:
-    """Everything about the geoms of an arena."""
+    """Findings about the geoms of an arena."""
     model, heights = scene.model, heights_of(scene)
     robot = model.body_rootid == model.body(ROBOT_BODY).id
     findings = _found(model)
@@ -103,7 +103,7 @@ def seen_by_rays(model: mujoco.MjModel) -> np.ndarray:
 
 
 def _found(model: mujoco.MjModel) -> list[Finding]:
-    """The walls: how many, of what kind, which, and how large the arena is."""
+    """Findings about the walls' number, kinds and names, and the arena's size."""
     geoms = np.flatnonzero(walls(model)).tolist()
     box = box_around(model, walls(model))
     if box is None:
@@ -132,7 +132,7 @@ def _found(model: mujoco.MjModel) -> list[Finding]:
 def _wall(
     model: mujoco.MjModel, geom: int, place: Place, heights: Heights
 ) -> list[Finding]:
-    """What is wrong with a geom that the shell can hit."""
+    """Finding about a geom that the shell can hit, if it is no good wall."""
     if _SHAPE(model.geom_type[geom]) not in CONVEX:
         kind = _kind(model, geom)
         text = f"a wall cannot be of type {kind}: clearance to it has no measure"
@@ -160,7 +160,7 @@ def _wall(
 
 
 def _below(high: float, place: Place, heights: Heights) -> list[Finding]:
-    """A geom below the shell that the shell could hit: a floor, most probably."""
+    """Finding about a geom below the shell that could hit it: probably a floor."""
     if high > heights.shell[0] - START_CLEARANCE:
         text = "it lies below the shell, which may start nowhere near it; "
         text += f"expected {FLOOR_BITS} for a floor"
@@ -172,7 +172,7 @@ def _below(high: float, place: Place, heights: Heights) -> list[Finding]:
 def _no_wall(
     model: mujoco.MjModel, geom: int, place: Place, heights: Heights
 ) -> list[Finding]:
-    """What is wrong with a geom that stands still and the shell cannot hit."""
+    """Finding about a geom that stands still and the shell cannot hit."""
     if model.geom_type[geom] == _SHAPE.mjGEOM_PLANE:
         in_sight = abs(at_rest(model).geom_xmat[geom][8]) < 1 - 1e-9
     else:
@@ -187,7 +187,7 @@ def _no_wall(
 
 
 def _moving(model: mujoco.MjModel, geom: int, place: Place) -> list[Finding]:
-    """What becomes of a geom that moves and that the robot would meet."""
+    """Finding about a geom that moves and that the robot could touch."""
     hit = can_touch(model, model.geom(SHELL).id)[geom]
     if not hit and not seen_by_rays(model)[geom]:
         return []
@@ -197,7 +197,7 @@ def _moving(model: mujoco.MjModel, geom: int, place: Place) -> list[Finding]:
 
 
 def _mesh(model: mujoco.MjModel, geom: int, place: Place) -> list[Finding]:
-    """Whether a wall is a mesh with hollows: hit as its hull, seen as it is."""
+    """Finding about a mesh with hollows, which the shell hits as its convex hull."""
     if model.geom_type[geom] != _SHAPE.mjGEOM_MESH:
         return []
     vertices, faces = mesh(model, geom)

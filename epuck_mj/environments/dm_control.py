@@ -1,7 +1,7 @@
-"""dm_control tasks: wall following as a `dm_env` environment, for anybody's agent.
+"""dm_control tasks: wall following as a `dm_env` environment for agents.
 
-The suite's habit: `env = epuck_mj.load("follow_walls", {"random": 1})`. The parts
-(observe, command, step fitness) are those of batched evaluation, so that the same
+As in dm_control's suite: `env = epuck_mj.load("follow_walls", {"random": 1})`. The
+parts (observe, command, step fitness) are those of batched evaluation, so that the same
 actions give the same bits.
 """
 
@@ -163,7 +163,7 @@ class FollowWalls(base.Task):
         self._k += 1
 
     def get_observation(self, physics: mujoco.Physics) -> OrderedDict[str, np.ndarray]:
-        """What the network sees."""
+        """Observation of the network."""
         return OrderedDict(proximity=self._observe(physics))
 
     def get_reward(self, physics: mujoco.Physics) -> float:

@@ -1,4 +1,4 @@
-"""What all command lines share: one clear line and exit status 2 for bad input."""
+"""Command lines: parsing, and one clear line with exit status 2 for bad input."""
 
 import contextlib
 import io
@@ -29,7 +29,7 @@ def parse(
     default: Options | None = None,
     examples: Sequence[str] = (),
 ) -> Options:
-    """The options in `argv`; the fields of `kind` are the flags.
+    """Parse `argv` into options whose flags are the fields of `kind`.
 
     Args:
         kind: dataclass of the options.
@@ -76,7 +76,7 @@ def _in_one_line(text: str, prog: str) -> str:
 
 
 def _unboxed(text: str) -> str:
-    """The message of tyro's box of several lines, on one and without its extras."""
+    """Text of tyro's box of several lines on one line, without its extras."""
     drawn = "│" in text
     lines = [
         line.strip("│ ") for line in text.splitlines() if line[:1] not in ("╭", "╰")
@@ -112,7 +112,7 @@ EXTRAS = (
     (r"^(\w+) Input should be greater than ", r"\1: expected more than "),
     (r"^(\w+) Input should be ", r"\1: expected "),
 )
-"""What pydantic adds for programmers, and what stands for it."""
+"""Texts that pydantic adds for programmers, and their replacements."""
 
 
 def main(run: Callable[[Sequence[str]], int]) -> None:
@@ -128,14 +128,14 @@ def main(run: Callable[[Sequence[str]], int]) -> None:
     except KeyboardInterrupt:
         status = 130
     except BrokenPipeError:
-        # whoever reads has gone; python's own flush at exit must not complain
+        # stdout is closed; python's own flush at exit must not complain
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 1
     sys.exit(status)
 
 
 def shell_command(module: str, *arguments: str | Path) -> str:
-    """The line that runs a module of ours, as a person would type it here."""
+    """The shell command that runs a module, as one would type it here."""
     python = Path(sys.executable)
     if python.is_relative_to(Path.cwd()):
         python = python.relative_to(Path.cwd())
@@ -145,7 +145,7 @@ def shell_command(module: str, *arguments: str | Path) -> str:
 
 
 def check_threads(threads: int) -> None:
-    """Nothing, if so many threads make sense; 0 stands for one per core.
+    """Refuse negative or too large numbers of threads; 0 stands for one per core.
 
     Raises:
         UserError: if not.

@@ -15,13 +15,13 @@ import numpy as np
 from epuck_mj.errors import UserError
 
 TEMPORARY = ".tmp"
-"""End of the names of files that are being written."""
+"""Ending of the names of files that are being written."""
 
 NO_FILE = "it is a pipe or a device, no file"
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Replace `path` by `content`; whoever reads sees the old file or the new.
+    """Replace `path` by `content`; readers see the old file or the new one.
 
     A link stays one, and what it names is replaced; pipes and devices are refused.
     """
@@ -41,13 +41,13 @@ def write_bytes(path: Path, content: bytes) -> None:
             temporary.unlink(missing_ok=True)
             raise
     except OSError as error:
-        # of the temporary one nobody has heard
+        # the user does not know the temporary file
         error.filename, error.filename2 = str(asked), None
         raise
 
 
 def _is_special(path: Path) -> bool:
-    """Whether something is there that is neither a file nor a folder."""
+    """Whether a path is neither a file nor a folder, but exists."""
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
@@ -64,7 +64,7 @@ def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def is_file(path: Path) -> bool:
-    """Whether a file is there; False as well for what cannot be a file's name."""
+    """Whether a file exists; False for what cannot be a file's name."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -72,7 +72,7 @@ def is_file(path: Path) -> bool:
 
 
 def is_directory(path: Path) -> bool:
-    """Whether a directory is there; False as well for what cannot be one's name."""
+    """Whether a directory exists; False for what cannot be a directory's name."""
     try:
         return path.is_dir()
     except (OSError, ValueError):
@@ -102,7 +102,7 @@ def find(name: str, kind: str, shipped: Mapping[str, Path], form: str) -> Path:
 
 @contextmanager
 def writing() -> Iterator[None]:
-    """What cannot be written in the block is the user's to put right.
+    """Turn errors of writing in the block into UserError.
 
     Raises:
         UserError: naming the file, if the system does.
@@ -116,7 +116,7 @@ def writing() -> Iterator[None]:
 
 
 def check_writable(path: Path) -> None:
-    """Nothing, if a file can be written there: better now than after the work.
+    """Refuse a path where no file can be written, before the work is done.
 
     Raises:
         UserError: if not.
@@ -141,12 +141,12 @@ def leftovers(folder: Path) -> list[Path]:
 
 
 def is_leftover(path: Path) -> bool:
-    """Whether it is, or will be, one of those."""
+    """Whether a path is the temporary file of a writer."""
     return path.match(f".*-????????{TEMPORARY}")
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove what killed writers left."""
+    """Remove temporary files of writers that were killed."""
     for path in leftovers(folder):
         path.unlink(missing_ok=True)
 
@@ -197,7 +197,7 @@ DAMAGED = (
     zipfile.BadZipFile,
     TokenError,
 )
-"""What numpy and zipfile raise for damaged archives."""
+"""Exceptions that numpy and zipfile raise for damaged archives."""
 
 
 def _temporary(path: Path) -> Path:

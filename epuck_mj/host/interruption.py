@@ -1,8 +1,8 @@
-"""Ctrl-C, kill and a closed terminal: one exception, and only where it may be raised.
+"""Ctrl-C, kill and a closed terminal as one exception, raised only where allowed.
 
-What stops motors or puts files in order must not be broken off half-way, not even by
-a first signal that comes while it runs. So signals raise inside `raising` only;
-elsewhere they are noted.
+Code that stops motors or completes files must not be interrupted, not even by a first
+signal. So a signal raises an exception only inside `raising`; elsewhere it is
+remembered.
 """
 
 import signal
@@ -12,7 +12,7 @@ from multiprocessing import resource_tracker
 from typing import Any, Self
 
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
-"""Ctrl-C, kill, a terminal that closes, Ctrl-Backslash, Ctrl-Z: where there are such.
+"""Names of the signals of Ctrl-C, kill, a closed terminal, Ctrl-Backslash and Ctrl-Z.
 
 Ctrl-Z would suspend who drives a robot, which would drive on: it ends things as well.
 """
@@ -21,7 +21,7 @@ SIGNALS = tuple(getattr(signal, name) for name in NAMES if hasattr(signal, name)
 
 
 class Interrupted(BaseException):
-    """A person or the system wants an end."""
+    """A signal asked the program to end."""
 
 
 class Interruption:
@@ -32,7 +32,7 @@ class Interruption:
     """
 
     def __init__(self, *signals: signal.Signals) -> None:
-        """Nothing came, nothing is handled; without `signals`, all of `SIGNALS` are."""
+        """Store the signals to handle, all of `SIGNALS` by default."""
         self._signals = signals or SIGNALS
         self.signum: signal.Signals | None = None
         self._raises = False
@@ -40,7 +40,7 @@ class Interruption:
 
     @property
     def status(self) -> int:
-        """What the shell expects of a process that a signal has ended."""
+        """Exit status of a process that a signal has ended."""
         return 128 + (self.signum or 0)
 
     def __enter__(self) -> Self:
@@ -50,7 +50,7 @@ class Interruption:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Leave them to who handled them before; if one came, to nobody.
+        """Restore the handlers of before; ignore further signals if one came.
 
         Then the process is at its end, whose status must say so.
         """
@@ -60,7 +60,7 @@ class Interruption:
 
     @contextmanager
     def raising(self) -> Iterator[None]:
-        """In this block a signal raises `Interrupted`, once; also one that came before.
+        """Raise `Interrupted` once for a signal in the block or before it.
 
         Raises:
             Interrupted: for the first signal.
@@ -87,7 +87,7 @@ class Interruption:
 
 
 def _follows_interruption(error: BaseException) -> bool:
-    """Whether it was raised on the way out of an interruption."""
+    """Whether an exception was raised while an interruption was handled."""
     cause = error.__context__
     while cause is not None and not isinstance(cause, Interrupted):
         cause = cause.__context__
@@ -96,9 +96,9 @@ def _follows_interruption(error: BaseException) -> bool:
 
 @contextmanager
 def deaf_to_interrupts() -> Iterator[None]:
-    """Keep Ctrl-C from processes started in the block: their parent ends them.
+    """Let processes started in the block ignore Ctrl-C, as their parent ends them.
 
-    One that comes meanwhile reaches this process when the block ends.
+    A Ctrl-C during the block reaches this process when the block ends.
     """
     if not hasattr(signal, "pthread_sigmask"):
         previous = signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,4 +1,4 @@
-"""Keys and values in YAML or JSON, read safely: a mapping or one clear line."""
+"""Keys and values from YAML or JSON, read safely, with one clear line if invalid."""
 
 import json
 from collections.abc import Callable
@@ -19,11 +19,11 @@ DAMAGED = (
     IndexError,
     AttributeError,
 )
-"""What yaml and json raise for texts that are none."""
+"""Exceptions that yaml and json raise for invalid texts."""
 
 
 def parse_yaml(text: str, where: str) -> Any:
-    """What a text says.
+    """Parse a text of YAML or JSON.
 
     Raises:
         UserError: beginning with `where`, if it is not YAML.
@@ -50,7 +50,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def to_yaml(content: Any) -> str:
-    """The text of plain values, keys in their order."""
+    """YAML text of plain values, keys in their order."""
     return yaml.safe_dump(content, sort_keys=False)
 
 

@@ -1,1 +1,1 @@
-"""Who drives: the evolved network, its file, the hand-written follower."""
+"""Policies: the evolved network, its file, the hand-written follower."""

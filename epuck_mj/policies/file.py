@@ -41,7 +41,7 @@ class Origin:
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
-        """What `dataclasses.asdict` gave; what else is there says nothing.
+        """Read what `dataclasses.asdict` gave; ignore other keys.
 
         Raises:
             ValueError: if it is anything else.
@@ -103,7 +103,7 @@ class ControllerFile:
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
-        """What `to_json`'s text says.
+        """Read what `to_json` wrote.
 
         Raises:
             ValueError: if it is anything else.

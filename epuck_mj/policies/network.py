@@ -1,7 +1,7 @@
-"""The paper's network: sensors in, one hidden layer, two wheels' worth out.
+"""The paper's network: sensors in, one hidden layer, speed and turn out.
 
 Sums are written out term by term instead of as a matrix product: BLAS orders a sum
-by the size of the batch, and a controller must act the same alone and in a crowd.
+by the size of the batch, and a controller must act the same alone and in a batch.
 """
 
 from dataclasses import asdict, dataclass
@@ -27,7 +27,7 @@ class Network:
     biases: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what is no shape: files say anything.
+        """Refuse an invalid number of hidden neurons or invalid biases.
 
         Raises:
             ValueError: if it is none.
@@ -38,7 +38,7 @@ class Network:
             raise ValueError(f"expected biases true or false, got {self.biases!r}")
 
     def to_dict(self) -> dict[str, Any]:
-        """The topology as controller files say it."""
+        """The topology as written in controller files."""
         return asdict(self)
 
     @property

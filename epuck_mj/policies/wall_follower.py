@@ -1,4 +1,4 @@
-"""A wall follower written by hand: a yardstick that owes nothing to evolution.
+"""A hand-written wall follower, a yardstick for evolved controllers.
 
 It keeps walls on its right. Its few numbers were chosen by hand in the paper's arena.
 """
@@ -6,17 +6,17 @@ It keeps walls on its right. Its few numbers were chosen by hand in the paper's 
 import numpy as np
 
 YARDSTICK = "wall-follower"
-"""What it is called where a champion may be named, and among the experiments."""
+"""Name of the hand-written wall follower, where a champion may be named."""
 
 BEHIND, RIGHT, RIGHT_DIAGONAL = 3, 2, 1
 AHEAD = (0, 6, 7)
-"""Front right, left diagonal, front left."""
+"""Indices of the front right, left diagonal and front left sensor."""
 
 CLEAR_AHEAD = 0.95
-"""Observation below which something stands in the way."""
+"""Observation below which there is a wall ahead."""
 
 TARGET = 0.5
-"""Right-diagonal observation to keep: about 7 mm off the wall, driving along it."""
+"""Observation of the right diagonal sensor to keep: about 7 mm from the wall."""
 
 GAIN = 1.5
 TURN_MAX = 0.4
@@ -38,5 +38,5 @@ class WallFollower:
         return np.stack([forward, np.where(blocked, -1.0, turn)], axis=-1)
 
     def __getitem__(self, index: object) -> "WallFollower":
-        """Itself: all members of the batch are alike."""
+        """The policy itself, as all members of the batch are alike."""
         return self

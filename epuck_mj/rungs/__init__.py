@@ -1,1 +1,1 @@
-"""By which physics a robot moves: the simulators and their table."""
+"""Rungs: the simulators by which a robot moves, and their table."""

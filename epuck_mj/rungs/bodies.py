@@ -1,4 +1,4 @@
-"""Bodies of one's own in MuJoCo: other masses, other friction, faster wheels."""
+"""Robots with bodies of their own in MuJoCo: masses, friction, faster wheels."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from epuck_mj.scene.model import Scene
 from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL
 
 SPARE_SPEED = 2.0
-"""Speed of embodied robots' wheels against the actuators' limits."""
+"""Highest wheel speed of embodied robots, as a multiple of the actuators' limits."""
 
 Fields = dict[str, tuple[np.ndarray, np.ndarray]]
 """Where fields of MuJoCo's model differ, by name: a mask or indices, and the values

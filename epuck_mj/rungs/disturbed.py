@@ -1,8 +1,7 @@
 """Simulated robots with the sensors and motors of real ones.
 
-Between the policy and the wheels stands the firmware, which knows whole steps per
-second only; between the walls and the policy stand sensors that count. What they count
-is put back into metres as the bridge does it on a robot.
+The firmware rounds commands to whole steps per second. The sensors count, and their
+counts are converted back into metres as the bridge does on a robot.
 """
 
 import numpy as np
@@ -17,7 +16,7 @@ from epuck_mj.step.sensors import Reading, counted, sensed_distance
 def disturbed(
     robots: Simulator, disturbances: Disturbances | None, control_step: float
 ) -> Robots:
-    """Robots with disturbances around them, or as they are if there are none.
+    """Robots with these disturbances, or the robots unchanged if there are none.
 
     Args:
         robots: that drive.
@@ -32,7 +31,7 @@ def disturbed(
 
 
 class DisturbedRobots:
-    """Robots in disturbances; stepped like those inside."""
+    """Robots whose commands and readings are disturbed."""
 
     def __init__(
         self,
@@ -97,7 +96,7 @@ class DisturbedRobots:
         return self._robots.clearances()
 
     def _sensed(self, reading: Reading) -> Reading:
-        """What the robots make of it; the truth goes along."""
+        """The disturbed reading, with the true distances."""
         given, of = self._disturbances, self._of
         truth, before = reading.distance, self._before
         self._before = truth

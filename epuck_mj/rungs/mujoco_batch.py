@@ -1,4 +1,4 @@
-"""Any number of simulated robots, each in an arena of its own, stepped at once.
+"""Many simulated robots, each in its own copy of the arena, stepped at once.
 
 One `mujoco.batch.Batch` holds them; its threads step the ones still active. What a
 robot does depends on its start and commands only: not on the number of threads, nor
@@ -90,20 +90,20 @@ class MujocoRobots:
             self._embodied = False
 
     def keep(self, mask: np.ndarray) -> None:
-        """Go on with the active robots that `mask` `(active,)` names."""
+        """Keep only the active robots that `mask` `(active,)` selects."""
         self._active = self._active[mask]
 
     def poses(self) -> np.ndarray:
-        """Where the active robots are, `(active, 3)`: x, y [m], yaw [rad]."""
+        """Poses of the active robots, `(active, 3)`: x, y [m], yaw [rad]."""
         return self.scene.poses(self._qpos[self._active])
 
     def clearances(self) -> np.ndarray:
-        """From the active robots' shells to the nearest wall [m], `(active,)`."""
+        """Distances from the active robots to the nearest wall [m], `(active,)`."""
         return self._probe.measure(self.poses()).distance
 
     @cached_property
     def _probe(self) -> ClearanceProbe:
-        """Made for those who ask."""
+        """Clearance probe, made at its first use."""
         return ClearanceProbe(self.scene, self._threads)
 
     def _reading(self) -> Reading:

@@ -1,4 +1,4 @@
-"""What every rung offers: robots that can be placed, driven, weighed and looked at."""
+"""Interface of every rung: robots that can be placed, driven and observed."""
 
 from typing import Protocol
 

@@ -1,4 +1,4 @@
-"""The table of rungs: by which physics a robot moves. The only door to a simulator.
+"""The table of rungs, the only way to a simulator.
 
 A rung belongs to a robot's name, since it changes results. Another one is a module with
 a `Simulator` and a line in `RUNGS`.
@@ -14,11 +14,11 @@ RUNGS: Mapping[str, Callable[[Scene, int, int], Simulator]] = {
     "epuck": MujocoRobots,
     "epuck_planar": MujocoRobots,
 }
-"""How robots are made, by the robot's name; a robot of one's own moves by MuJoCo."""
+"""Makers of simulators by the robot's name; other robots use MuJoCo."""
 
 
 def robots_in(scene: Scene, capacity: int, threads: int = 0) -> Simulator:
-    """Robots of a scene, by the physics that their name stands for.
+    """Robots of a scene, in the simulator that belongs to their name.
 
     Args:
         scene: robot and arena.

@@ -1,4 +1,4 @@
-"""One robot in MuJoCo that others can look at after every physics step."""
+"""One robot in MuJoCo, with a callback after every physics step."""
 
 import copy
 from collections.abc import Callable
@@ -52,10 +52,10 @@ class WatchedRobot:
         return self._reading()
 
     def keep(self, mask: np.ndarray) -> None:
-        """See `Robots.keep`; one robot stays or there is none left to step."""
+        """See `Robots.keep`: the robot stays, or none is left to step."""
 
     def poses(self) -> np.ndarray:
-        """Where the robot is, `(1, 3)`: x, y [m], yaw [rad]."""
+        """Pose of the robot, `(1, 3)`: x, y [m], yaw [rad]."""
         return self.scene.poses(self.data.qpos[None])
 
     def embody(self, mass: np.ndarray, friction: np.ndarray) -> None:
@@ -73,12 +73,12 @@ class WatchedRobot:
             self._embodied = False
 
     def clearances(self) -> np.ndarray:
-        """From the robot's shell to the nearest wall [m], `(1,)`."""
+        """Distance from the robot's shell to the nearest wall [m], `(1,)`."""
         return self._probe.measure(self.poses()).distance
 
     @cached_property
     def _probe(self) -> ClearanceProbe:
-        """Made for those who ask."""
+        """Clearance probe, made at its first use."""
         return ClearanceProbe(self.scene, 1)
 
     def _reading(self) -> Reading:

@@ -1,1 +1,1 @@
-"""Where a robot drives: MJCF in, a compiled model and its geometry out."""
+"""Scenes: MJCF compiled to a model, with its geometry and starts."""

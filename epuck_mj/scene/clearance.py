@@ -1,8 +1,8 @@
 """Clearance: how far the shell is from the nearest wall, by true geometry.
 
 MuJoCo's own distance between convex shapes, so any arena will do. It is measured in a
-model of its own that holds the walls and the shell and nothing else: whole scenes
-would cast the robot's rays on every pose.
+separate model with only the walls and the shell, since a whole scene would also compute
+the robot's rays for every pose.
 
 The robot stands upright on its start height, as on a flat floor. Distances are those in
 space, which beside upright walls are those in the plane.
@@ -20,16 +20,16 @@ from epuck_mj.scene.model import Scene
 from epuck_mj.scene.robot_parts import SHELL
 
 CLEARANCE_MAX = 0.2
-"""Clearance from which on nobody looks for the nearest wall [m]: costs time."""
+"""Clearance beyond which the nearest wall is not looked for, to save time [m]."""
 
 CHUNK = 8192
-"""Poses measured at once: bounds memory, changes no result."""
+"""Number of poses measured at once: bounds memory, changes no result."""
 
 TOLERANCE = 1e-9
-"""Of distances [m]: MuJoCo's own 1e-6 blurs the direction of a wall near contact."""
+"""Tolerance of distances [m]: with MuJoCo's 1e-6 directions are wrong near contact."""
 
 ITERATIONS = 200
-"""Most steps towards that tolerance; most shapes need ten."""
+"""Most iterations of MuJoCo's distances; most shapes need ten."""
 
 _SHAPE, _SENSOR, _OBJECT = mujoco.mjtGeom, mujoco.mjtSensor, mujoco.mjtObj
 
@@ -41,14 +41,14 @@ CONVEX = {
     _SHAPE.mjGEOM_BOX,
     _SHAPE.mjGEOM_MESH,
 }
-"""Shapes with an exact distance; meshes count as their hull, as in collisions."""
+"""Shapes with an exact distance; a mesh counts as its hull, as in collisions."""
 
 _ROBOT = "robot"
 
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
-    """What is nearest to robots on poses `(...)`; NaN where the pose is.
+    """Nearest walls of robots on poses `(...)`; NaN where the pose is NaN.
 
     Attributes:
         distance: from the shell to the nearest wall [m], `(...)`: negative inside it,

@@ -1,4 +1,4 @@
-"""What a compiled scene looks like and where it is, whatever robot and arena it has."""
+"""Geometry of a compiled scene: shapes, colours and places of its geoms."""
 
 import mujoco
 import numpy as np
@@ -14,7 +14,7 @@ COLLISION_GROUP = 3
 
 
 def at_rest(model: mujoco.MjModel) -> mujoco.MjData:
-    """Where everything is before anything moves."""
+    """State of a scene before anything moves."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     return data
@@ -57,7 +57,7 @@ def box_around(
 
 
 def arena_box(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of the box around what is seen of the arena, `(3,)` each [m]."""
+    """Corners of the box around the visible arena, `(3,)` each [m]."""
     box = box_around(model, drawn(model) & static(model))
     # an arena of a floor only
     return box or (np.array([-0.5, -0.5, 0.0]), np.array([0.5, 0.5, 0.0]))
@@ -91,7 +91,7 @@ def color(model: mujoco.MjModel, geom: int) -> np.ndarray:
 def kinematics(
     scene: Scene, poses: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Where bodies and rays are on each pose `(n, 3)`, in the world.
+    """Places of bodies and rays in the world, for each pose `(n, 3)`.
 
     Returns:
         Positions [m] and quaternions of all bodies, `(n, nbody, 3)`, `(n, nbody, 4)`;

@@ -1,4 +1,4 @@
-"""MJCF in, compiled model out: an arena with its robot exchanged."""
+"""Compiling MJCF: an arena with its robot exchanged."""
 
 import hashlib
 import xml.etree.ElementTree as ET
@@ -37,7 +37,7 @@ class SceneText:
 
 
 def compiled(arena: Path, robot: Path) -> tuple[mujoco.MjModel, dict[str, str]]:
-    """The model of a robot in an arena, and SHA-256 of every file that is in it.
+    """The model of a robot in an arena, and the SHA-256 of each of its files.
 
     The hashes are called `arena`, `robot`, and by name for all other files.
 
@@ -138,7 +138,7 @@ def _includes(text: str, path: Path) -> list[str]:
 
 
 def _included(path: Path) -> str:
-    """The text of a file that is included; it includes none: nobody would hash it."""
+    """Text of an included file, which must not include others."""
     text = read_text(path)
     inner = _includes(text, path)
     if inner:
@@ -155,7 +155,7 @@ def _has_robot(text: str, path: Path) -> bool:
 
 @contextmanager
 def _complaints(source: Path) -> Iterator[None]:
-    """MuJoCo's complaints about a file on one line."""
+    """MuJoCo's errors about a file on one line."""
     try:
         yield
     except ValueError as error:

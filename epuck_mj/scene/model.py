@@ -2,7 +2,7 @@
 
 An arena is any MJCF with walls. It may include a robot, so that MuJoCo's viewer shows
 the whole scene; `load_scene` puts the robot asked for in that one's place. Robots
-differ in their base and nothing else: everybody else calls `Scene.qpos` and friends.
+differ in their base only, which the methods of `Scene` hide from other modules.
 """
 
 import hashlib
@@ -81,7 +81,7 @@ class Scene:
         return qpos
 
     def poses(self, qpos: np.ndarray) -> np.ndarray:
-        """Where the robot is, `(..., 3)`: x, y [m], yaw [rad], from `(..., nq)`."""
+        """Poses of the robot, `(..., 3)`: x, y [m], yaw [rad], from `(..., nq)`."""
         base, free = self._base
         if not free:
             return qpos[..., base : base + 3].copy()
@@ -90,17 +90,17 @@ class Scene:
         return np.concatenate([qpos[..., base : base + 2], yaw[..., None]], axis=-1)
 
     def reading(self, sensordata: np.ndarray) -> Reading:
-        """What the robot reports, from MuJoCo's `(..., nsensordata)`."""
+        """Reading of the robot, from MuJoCo's `(..., nsensordata)`."""
         return Reading(
             sensordata[..., self._distance], sensordata[..., self._contact] > 0
         )
 
 
 def once_per_model(measure: Measure) -> Measure:
-    """A function of a scene that is computed once for scenes that are compiled alike.
+    """Compute a function of a scene only once for scenes that are compiled alike.
 
     Its result depends on the model and on arguments behind the scene that can be
-    compared; whoever gets it must not change it.
+    compared. Callers must not change the result.
     """
     known: dict[object, Any] = {}
 
@@ -121,7 +121,7 @@ def once_per_model(measure: Measure) -> Measure:
 
 
 REMEMBERED = 32
-"""Results of each function that are kept in memory."""
+"""Number of results of each function that are kept in memory."""
 
 
 def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:

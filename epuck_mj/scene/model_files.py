@@ -1,4 +1,4 @@
-"""The MJCF files of robots and arenas: those that are shipped, and a person's own."""
+"""The MJCF files of robots and arenas: shipped ones and the user's own."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ evolved on it on the second as well."""
 
 
 def absolute(name: str) -> str:
-    """The name of a robot or arena; if it is a path, from the root on."""
+    """The name of a robot or arena, or its absolute path."""
     path = Path(name)
     shipped = {file.stem for file in MODELS.rglob("*.xml")}
     return name if name in shipped or not is_file(path) else str(path.resolve())

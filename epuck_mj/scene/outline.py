@@ -1,4 +1,4 @@
-"""Outlines from above, for figures: of the walls and of the robot's shell."""
+"""Outlines of walls and of the robot's shell from above, for figures."""
 
 import mujoco
 import numpy as np
@@ -8,11 +8,11 @@ from epuck_mj.scene.model import Scene
 from epuck_mj.scene.robot_parts import SHELL
 
 OUTLINE_POINTS = 64
-"""Directions in which an outline is looked for."""
+"""Number of directions in which an outline is sampled."""
 
 
 def wall_outlines(scene: Scene) -> list[np.ndarray]:
-    """What stands still and the shell can hit, from above: `(points, 2)` each [m]."""
+    """Outlines of the walls from above, `(points, 2)` each [m]."""
     model, data = scene.model, at_rest(scene.model)
     solid = walls(model) & (model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE)
     return [
@@ -58,6 +58,6 @@ def _outline(
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
-    """Vectors `(n, 3)` at length 1; 0 stays 0."""
+    """Vectors `(n, 3)` scaled to length 1; zero vectors stay zero."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return vectors / np.maximum(length, np.finfo(float).tiny)

@@ -1,4 +1,4 @@
-"""What every robot and every arena must have, by MuJoCo's names."""
+"""Parts that every robot and every arena must have, by MuJoCo's names."""
 
 from pathlib import Path
 
@@ -13,13 +13,13 @@ SHELL = "shell"
 WHEELS = ("wheel_left", "wheel_right")
 PROXIMITY = tuple(f"ps{i}" for i in range(N_PROXIMITY))
 TIMESTEP = "timestep"
-"""A number that a robot's MJCF may bring: its physics step [s]."""
+"""Name of the number with which a robot's MJCF sets its physics step [s]."""
 
 _JOINT, _SENSOR = mujoco.mjtJoint, mujoco.mjtSensor
 
 
 def check_base(model: mujoco.MjModel, robot: Path) -> None:
-    """Refuse a base on which no pose can be set.
+    """Refuse a robot whose pose cannot be set.
 
     Raises:
         UserError: if it is one.
@@ -41,7 +41,7 @@ def check_base(model: mujoco.MjModel, robot: Path) -> None:
 
 
 def check_floor(model: mujoco.MjModel, arena: Path) -> None:
-    """Refuse a floor that the shell would hit, and wheels with nothing to drive on.
+    """Refuse a floor that the shell would hit, and wheels without a floor.
 
     Raises:
         UserError: if the arena has either.
@@ -52,7 +52,7 @@ def check_floor(model: mujoco.MjModel, arena: Path) -> None:
         raise UserError(
             f"arena '{arena}': the robot's shell would hit the plane "
             f"'{model.geom(geom).name or geom}'; expected a floor with "
-            'contype="2" conaffinity="2", which wheels meet and shells do not'
+            'contype="2" conaffinity="2", which wheels touch and shells do not'
         )
     base = model.body_jntadr[model.body(ROBOT_BODY).id]
     if model.jnt_type[base] != _JOINT.mjJNT_FREE:
@@ -77,7 +77,7 @@ def can_touch(model: mujoco.MjModel, geom: int) -> np.ndarray:
 
 
 def sensor_address(model: mujoco.MjModel, name: str, kind: int, robot: Path) -> int:
-    """Address of a sensor of that kind in sensordata.
+    """Address in sensordata of a named sensor of a given kind.
 
     Raises:
         UserError: if there is none.

@@ -1,4 +1,4 @@
-"""Starts: where in an arena of any shape a robot may be put.
+"""Starts: poses in an arena of any shape where a robot may start.
 
 Free means that the shell keeps a clearance to everything it can hit; inside means
 that the robot could not be pushed from there to the outside of the walls.
@@ -21,19 +21,19 @@ NODES_MAX = 400
 """Most grid nodes along one side of the arena."""
 
 SPACING_MIN = 0.01
-"""Grid spacing [m], unless the arena is larger than NODES_MAX of it."""
+"""Grid spacing [m], unless the arena is larger than NODES_MAX spacings."""
 
 
 BLOCK = 64
-"""Candidates drawn at once; part of what a seed means."""
+"""Number of candidates drawn at once; changing it changes all starts."""
 
 BLOCKS_MAX = 1000
-"""Blocks drawn before giving up."""
+"""Number of blocks drawn before giving up."""
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Where a robot fits, on the nodes of a grid over the arena.
+    """Grid over an arena with the nodes where a robot fits.
 
     Attributes:
         lower: corner of the box around the walls, `(2,)` [m].
@@ -53,7 +53,7 @@ class Grid:
 
     @property
     def nodes(self) -> np.ndarray:
-        """Where the nodes are, `(x, y, 2)` [m]."""
+        """Places of the nodes, `(x, y, 2)` [m]."""
         return self.origin + self.spacing * np.moveaxis(
             np.indices(self.free.shape), 0, -1
         )
@@ -69,7 +69,7 @@ class Grid:
 
 @once_per_model
 def survey(scene: Scene, clearance: float) -> Grid:
-    """Where a robot fits, whether or not it may start there.
+    """Grid of the places where a robot fits.
 
     Args:
         scene: robot and arena.
@@ -100,7 +100,7 @@ def survey(scene: Scene, clearance: float) -> Grid:
 
 
 def enclosed(free: np.ndarray) -> np.ndarray:
-    """Which free nodes of a grid `(x, y)` have no way to its edge, `(x, y)`."""
+    """Mask `(x, y)` of the free nodes of a grid that have no way to its edge."""
     parts = np.empty(free.shape, np.int32)
     ndimage.label(free, output=parts)
     edge = np.concatenate([parts[0], parts[-1], parts[:, 0], parts[:, -1]])
@@ -111,7 +111,7 @@ class FreeSpace:
     """The poses of a scene where a robot may start."""
 
     def __init__(self, scene: Scene, clearance: float):
-        """Find the free space, on a grid first.
+        """Find the free space on a grid.
 
         Args:
             scene: robot and arena.
@@ -154,7 +154,7 @@ class FreeSpace:
 
 
 def _with_margin(model: mujoco.MjModel, clearance: float) -> mujoco.MjModel:
-    """The model with a shell that already touches at that clearance [m]."""
+    """The model with a shell that is larger by a clearance [m]."""
     model = copy.copy(model)
     model.geom_margin[model.geom(SHELL).id] = clearance
     model.body_margin[model.body(ROBOT_BODY).id] = clearance

@@ -17,33 +17,33 @@ from epuck_mj.scene.model import Scene, once_per_model
 from epuck_mj.scene.starts import FreeSpace
 
 LOOP_CLEARANCE = 0.02
-"""Clearance of the loops [m]: the middle of what counts as near a wall."""
+"""Clearance of the loops [m]: half of the clearance that counts as near a wall."""
 
 POINT_SPACING = 0.002
-"""Distance of loop points [m]: far less than a control step's way of 13 mm."""
+"""Distance of loop points [m]: far less than the 13 mm of a control step."""
 
 BIN = 0.05
-"""Length of loop that is visited as a whole [m]: more than a corner cuts off."""
+"""Length of the parts of a loop that count as visited [m]: more than a cut corner."""
 
 ABSENCE_MAX = 0.15
-"""Longest way off the walls that still belongs to following [m]: a corner cut.
+"""Longest way away from walls that still counts as following [m]: a cut corner.
 
 A robot that crosses the arena makes no progress along its walls by that.
 """
 
 DETOUR_MAX = 2.0
-"""Most progress along a loop per way driven: inside a bend the way is shorter.
+"""Most progress along a loop per distance driven: inside a bend it exceeds 1.
 
 More, and it is the nearest point that has jumped, as between two walls of a corridor.
 """
 
 CORNER_CUT = 2 * (PROXIMITY_RANGE - LOOP_CLEARANCE)
-"""Loop that the nearest point skips at a right corner, driven at full range [m]."""
+"""Length that the nearest loop point skips at a right corner at full range [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoopProgress:
-    """Ways of `(n,)` robots along `(loops,)` loops.
+    """Progress of `(n,)` robots along `(loops,)` loops.
 
     Attributes:
         net: along each loop, back and forth cancelled [m], `(n, loops)`; the sign is
@@ -72,7 +72,7 @@ class WallLoops:
     length: np.ndarray
 
     def progress(self, poses: np.ndarray, near: np.ndarray) -> LoopProgress:
-        """How far robots came along the walls.
+        """Progress of robots along the walls.
 
         Args:
             poses: `(n, rows, 3)`: x, y [m], yaw [rad], NaN after the end.
@@ -97,7 +97,7 @@ class WallLoops:
     def _visited(
         self, robot: np.ndarray, loop: np.ndarray, arc: np.ndarray, n: int
     ) -> np.ndarray:
-        """Share of bins that hold a moment `(moments,)` of each of `n` robots."""
+        """Share of the loops' bins that each of `n` robots visited, `(n,)`."""
         bins = np.maximum(np.round(self.length / BIN), 1).astype(int)
         first = np.cumsum(bins) - bins
         visited = np.zeros((n, bins.sum()), bool)
@@ -144,7 +144,7 @@ def wall_loops(scene: Scene) -> WallLoops:
 
 
 def _evenly(line: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Points at equal ways along a closed line `(m, 2)`, and its length.
+    """Points at equal distances along a closed line `(m, 2)`, and its length.
 
     Returns:
         Points `(n, 2)`, the way to each of them `(n,)`, and all the way round [m].

@@ -1,4 +1,4 @@
-"""Colours that the colour-blind tell apart too: those of Okabe and Ito."""
+"""Colours of Okabe and Ito, which colour-blind people can tell apart."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ LOW_FITNESS, HIGH_FITNESS = YELLOW, BLUE
 
 
 def fraction(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
-    """A colour as matplotlib has it: it counts to 1."""
+    """A colour for matplotlib, with components in [0, 1]."""
     red, green, blue = rgb
     return red / 255, green / 255, blue / 255
 

@@ -1,4 +1,4 @@
-"""Figures for a paper: how fitness grew, and where the robot went.
+"""Figures of fitness against evaluations and of trajectories.
 
 Figures are made as objects, never through pyplot: nothing global, no window.
 """
@@ -109,7 +109,7 @@ def trajectory_figure(
 def _draw_trajectory(
     axes: Axes, scene: Scene, trajectory: Trajectory
 ) -> LineCollection:
-    """Path, start, and the robot where it ended; returns what the colours mean."""
+    """Draw path, start and end of a robot; the colours' mapping."""
     points = trajectory.pose[:, :2]
     path = LineCollection(
         list(np.stack([points[:-1], points[1:]], axis=1)),

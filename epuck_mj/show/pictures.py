@@ -1,4 +1,4 @@
-"""Pictures as files: in full or not at all, and equal for equal content."""
+"""Pictures as files, written completely or not at all, with equal bytes if equal."""
 
 import io
 from pathlib import Path

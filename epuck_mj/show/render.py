@@ -1,4 +1,4 @@
-"""Pictures in 3D, drawn by MuJoCo without a window, with EGL or OSMesa.
+"""Pictures in 3D, drawn by MuJoCo with EGL or OSMesa, without a window.
 
 The package switches MuJoCo's own choice between them off, so the context is made here
 and nowhere else.
@@ -21,31 +21,31 @@ from epuck_mj.show.colors import HIGH_FITNESS, LOW_FITNESS, TRIALS, blend
 from epuck_mj.trials.trajectory import Trajectory
 
 LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}
-"""OpenGL without a window, by MuJoCo's name for it, in the order tried."""
+"""Libraries for OpenGL without a window, by MuJoCo's names, in the order tried."""
 
 PATH_HEIGHT = 0.003
-"""Of the path above the floor [m]."""
+"""Height of the path above the floor [m]."""
 
 PATH_RADIUS = 0.004
-"""Of the path as drawn [m]."""
+"""Radius of the path as drawn [m]."""
 
 ELEVATION = -60.0
-"""Of the camera's line of sight [degrees]."""
+"""Elevation of the camera's line of sight [degrees]."""
 
 MARK_HEIGHT, MARK_RADIUS = 0.07, 0.012
-"""Of the ball above a robot that tells it from others [m]."""
+"""Height and radius of the coloured ball above a robot [m]."""
 
 DRAFT_SHADOWS = 1024
 """Size of a draft's shadow map [pixels]."""
 
 CAMERA_DISTANCE = 1.05
-"""Of the camera from the arena's middle, in diagonals of the arena."""
+"""Distance of the camera from the arena's middle, in diagonals of the arena."""
 
 _CATEGORY = mujoco.mjtCatBit
 
 
 class Painter:
-    """Draws trials in an arena at any of their times; made by `painter`."""
+    """Painter of trials in an arena at any time; made by `painter`."""
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class Painter:
         height: int,
         draft: bool,
     ):
-        """Set everything up; OpenGL has to be current."""
+        """Set up the scene; OpenGL has to be current."""
         # the copy is for looking at only
         model = copy.copy(scene.model)
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
@@ -120,7 +120,7 @@ class Painter:
         )
 
     def _add_robot(self) -> None:
-        """One more robot, which the physics knows nothing of."""
+        """Add one more robot, which is drawn but not simulated."""
         mujoco.mjv_addGeoms(
             self._model,
             self._data,
@@ -131,7 +131,7 @@ class Painter:
         )
 
     def free(self) -> None:
-        """Give OpenGL's memory back."""
+        """Free OpenGL's memory."""
         self._context.free()
 
 
@@ -143,7 +143,7 @@ def painter(
     height: int,
     draft: bool = False,
 ) -> Iterator[Painter]:
-    """Draws trials while the context lasts.
+    """Make a painter of trials for the block.
 
     Args:
         scene: where the trajectories were recorded.
@@ -165,7 +165,7 @@ def painter(
 
 @contextmanager
 def opengl(width: int, height: int) -> Iterator[None]:
-    """OpenGL without a window, current while the context lasts.
+    """Make OpenGL without a window current for the block.
 
     Raises:
         UserError: if there is none.
@@ -196,7 +196,7 @@ def opengl(width: int, height: int) -> Iterator[None]:
 
 
 def _camera(model: mujoco.MjModel) -> mujoco.MjvCamera:
-    """A camera that sees the whole arena."""
+    """Make a camera that sees the whole arena."""
     lower, upper = arena_box(model)
     camera = mujoco.MjvCamera()
     # what is near looks larger: a little to the front of the middle
@@ -207,7 +207,7 @@ def _camera(model: mujoco.MjModel) -> mujoco.MjvCamera:
 
 
 def _pose_at(trajectory: Trajectory, time: float) -> np.ndarray:
-    """Where the robot is at a time [s] between rows, `(3,)`; at the end it stays."""
+    """Pose `(3,)` at a time [s], interpolated; after the end the last pose."""
     x, y, yaw = trajectory.pose.T
     columns = (x, y, np.unwrap(yaw))
     return np.array([np.interp(time, trajectory.time, column) for column in columns])
@@ -216,7 +216,7 @@ def _pose_at(trajectory: Trajectory, time: float) -> np.ndarray:
 def _add_path(
     view: mujoco.MjvScene, trajectory: Trajectory, time: float, pose: np.ndarray
 ) -> None:
-    """One capsule per control step so far, coloured by step fitness."""
+    """Draw one capsule per control step so far, coloured by step fitness."""
     steps = int(np.searchsorted(trajectory.time[1:], time))
     points = np.full((min(steps + 1, trajectory.steps) + 1, 3), PATH_HEIGHT)
     points[:, :2] = trajectory.pose[: len(points), :2]
@@ -233,7 +233,7 @@ def _add_path(
 
 
 def _add_mark(view: mujoco.MjvScene, pose: np.ndarray, trial: int) -> None:
-    """A ball above the robot in the colour of its trial."""
+    """Draw a ball above the robot in the colour of its trial."""
     rgba = np.array([*np.array(TRIALS[trial % len(TRIALS)]) / 255, 1], np.float32)
     mujoco.mjv_initGeom(
         view.geoms[view.ngeom],

@@ -24,10 +24,10 @@ except ModuleNotFoundError as error:
     ) from None
 
 FRAME_RATE = 25
-"""Pictures per second; the robot moves between control steps as straight as it can."""
+"""Pictures per second; poses between control steps are interpolated."""
 
 LAST_LOOK = 1.0
-"""How long the end is shown [s]."""
+"""How long the last picture is shown [s]."""
 
 
 def save_video(

@@ -1,1 +1,1 @@
-"""What a control step does: sensors, motors, fitness, disturbances."""
+"""The control step: sensors, motors, fitness, disturbances."""

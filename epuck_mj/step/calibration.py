@@ -1,4 +1,4 @@
-"""Calibration: in what one robot differs from the robot of the books.
+"""Calibration: the sensor gains, wheel radii and track of one robot.
 
 Made by `python -m epuck_mj.calibrate`, read by simulation and bridge alike.
 """
@@ -15,15 +15,15 @@ from epuck_mj.host.files import write_text, writing
 from epuck_mj.host.yaml_and_json import read_yaml, to_yaml
 
 GAIN_MAX = 100.0
-"""What no sensor's gain reaches."""
+"""Upper limit of a sensor's gain."""
 
 LENGTH_MAX = 1.0
-"""The same of wheel radii and track [m]: millimetres are noticed."""
+"""Upper limit of wheel radii and track [m]: values in millimetres are refused."""
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """One robot.
+    """Sensor gains, wheel radii and track of one robot.
 
     Attributes:
         proximity_gains: counts of each sensor against the mean sensor's.
@@ -36,7 +36,7 @@ class Calibration:
     track: float = TRACK
 
     def __post_init__(self) -> None:
-        """Refuse what no robot has."""
+        """Refuse values that no robot has."""
         for name, size in (("proximity_gains", N_PROXIMITY), ("wheel_radii", N_WHEELS)):
             numbers = getattr(self, name)
             if not (isinstance(numbers, tuple) and len(numbers) == size):
@@ -56,7 +56,7 @@ class Calibration:
 
     @property
     def gains(self) -> np.ndarray:
-        """Of the proximity sensors, `(8,)`."""
+        """Gains of the proximity sensors, `(8,)`."""
         return np.array(self.proximity_gains)
 
     @property
@@ -65,7 +65,7 @@ class Calibration:
         return sum(self.wheel_radii) / N_WHEELS
 
     def save(self, path: Path) -> None:
-        """Write YAML.
+        """Write the calibration as YAML.
 
         Raises:
             UserError: if that is not possible.
@@ -93,7 +93,7 @@ class Calibration:
 
     @classmethod
     def from_dict(cls, content: Any) -> Self:
-        """What keys and values say; those missing are the books'.
+        """Read keys and values; missing ones are those of the nominal robot.
 
         Raises:
             ValueError: if they are no calibration's.

@@ -1,4 +1,4 @@
-"""Conditions: what the robots are like that live the trials, ideal or as there are."""
+"""Conditions: whether robots are ideal or have noise and differences, as real ones."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,12 +24,12 @@ NoiseLevel = Literal["none", "calibrated", "strong"]
 
 @dataclass(frozen=True)
 class Conditions:
-    """Ideal robots, or such as there are.
+    """Noise, randomisation and calibration of the robots of trials.
 
     Attributes:
         noise: name of a level of `NOISE`.
-        randomise: whether each trial has another robot.
-        calibration: of the one robot that lives all trials; None for that of the books.
+        randomise: whether each trial has a different robot.
+        calibration: calibration of the robot of all trials; None for the nominal robot.
     """
 
     noise: str = "none"
@@ -37,7 +37,7 @@ class Conditions:
     calibration: Calibration | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what excludes itself."""
+        """Refuse conditions that exclude each other."""
         real = {"randomise": self.randomise, "calibration": self.calibration}
         asked = [name for name, value in real.items() if value]
         if asked and NOISE[self.noise] is None:
@@ -45,13 +45,10 @@ class Conditions:
                 f"{asked[0]} needs noise: calibrated or strong, got {self.noise}"
             )
         if len(asked) > 1:
-            raise ValueError(
-                "expected randomise or calibration, got both: "
-                "many robots or one that is known"
-            )
+            raise ValueError("expected randomise or calibration, got both")
 
     def draw(self, rng: np.random.Generator, n: int, steps: int) -> Disturbances | None:
-        """What `n` trials of `steps` control steps meet; None for ideal robots."""
+        """Disturbances of `n` trials of `steps` steps; None for ideal robots."""
         level = NOISE[self.noise]
         if level is None:
             return None
@@ -70,14 +67,14 @@ class Conditions:
 
 @dataclass(frozen=True)
 class ConditionFlags:
-    """Flags for what the robots are like.
+    """Command-line flags for noise and differences of the robots.
 
     Attributes:
-        noise: none for ideal sensors and motors; calibrated or strong for real ones;
-            default leaves the choice to the command.
-        randomise: another robot in each trial; needs noise.
-        calibration: file of python -m epuck_mj.calibrate: that robot in all trials;
-            needs noise.
+        noise: none for ideal sensors and motors; calibrated for the noise of real ones;
+            strong for more noise; default for the command's own default.
+        randomise: give each trial a different robot; needs noise.
+        calibration: file written by python -m epuck_mj.calibrate: use that robot in all
+            trials; needs noise.
     """
 
     noise: NoiseLevel | Literal["default"] = "default"
@@ -86,7 +83,7 @@ class ConditionFlags:
 
     @property
     def conditions(self) -> Conditions | None:
-        """What was asked for; None if none of the flags was given.
+        """The conditions that the flags ask for; None if no flag was given.
 
         Raises:
             UserError: if they exclude each other, or the file is no calibration.

@@ -13,48 +13,48 @@ from epuck_mj.step.motors import Speeds, command
 from epuck_mj.step.sensors import Reading, observe
 
 STEPS_MAX = 10_000_000
-"""Most control steps of a trial: more is a mistake."""
+"""Most control steps of a trial."""
 
 START_CLEARANCE = 0.01
-"""Least distance to a wall at a start, if nobody says otherwise [m]. Chosen."""
+"""Default of the least distance to a wall at a start [m]. Chosen."""
 
 Policy = Callable[[np.ndarray], np.ndarray]
 
 Lost = Callable[[np.ndarray], np.ndarray]
-"""Which trials need not go on, `(trials,)`, given the most each can still reach."""
+"""Function from the most that trials can still reach to those to end, `(trials,)`."""
 
 
 class Robot(Protocol):
     """Anything that takes wheel speeds and reports what it senses one step later."""
 
     def step(self, command: np.ndarray) -> Reading:
-        """Drive for one control step; what is sensed at its end."""
+        """Drive for one control step; the reading at its end."""
         ...
 
     def poses(self) -> np.ndarray:
-        """Where it is, `(..., 3)`: x, y [m], yaw [rad]; NaN if nobody knows."""
+        """Poses, `(..., 3)`: x, y [m], yaw [rad]; NaN if unknown."""
         ...
 
     def clearances(self) -> np.ndarray:
-        """From its shell to the nearest wall [m], `(...)`; NaN if nobody knows."""
+        """Distances from shell to nearest wall [m], `(...)`; NaN if unknown."""
         ...
 
 
 class Robots(Robot, Protocol):
-    """Robots that start where they are put and can be retired one by one."""
+    """Robots that can be placed on starts and taken out one by one."""
 
     def reset(self, starts: np.ndarray) -> Reading:
         """Put one robot on each pose `(robots, 3)`: x, y [m], yaw [rad]."""
         ...
 
     def keep(self, mask: np.ndarray) -> None:
-        """Go on with those robots, of the ones still active, that `mask` names."""
+        """Keep only the active robots that `mask` selects."""
         ...
 
 
 @dataclass(frozen=True)
 class TaskParameters:
-    """What a trial is.
+    """Length, fitness, sensors and speeds of a trial.
 
     Attributes:
         steps: control steps of a trial.
@@ -74,7 +74,7 @@ class TaskParameters:
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
-        """What `dataclasses.asdict` gave, as stored with a controller.
+        """Read what `dataclasses.asdict` gave, as stored with a controller.
 
         Raises:
             ValueError: if the fields are others.
@@ -100,13 +100,13 @@ class TaskParameters:
 
     @property
     def step_fitness(self) -> StepFitness:
-        """The step fitness itself."""
+        """The function of the step fitness."""
         return step_fitness(self.fitness)
 
 
 @dataclass(frozen=True)
 class ControlStep:
-    """One control step of robots `(...)`: decided, carried out and judged.
+    """One control step of robots `(...)`: action, command, reading and fitness.
 
     Attributes:
         action: what the policy decided, `(..., 2)`.
@@ -192,26 +192,26 @@ class Trials:
 
 
 class Watcher(Protocol):
-    """Told of trials as they are lived."""
+    """Observer of trials while they are simulated."""
 
     def started(self, reading: Reading, observation: np.ndarray) -> None:
-        """What all robots sense on their starts, and their policies' first input."""
+        """Receive all robots' first readings and observations."""
         ...
 
     def stepped(self, k: int, active: np.ndarray, step: ControlStep) -> None:
-        """What came of control step `k` for each of the trials `(active,)`."""
+        """Receive the outcome of control step `k` of the active trials `(active,)`."""
         ...
 
 
 class BatchPolicy(Protocol):
-    """A policy with one member per robot, from which members can be picked."""
+    """A policy with one member per robot, of which members can be selected."""
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
         """Actions `(robots, 2)` for observations `(robots, 8)`."""
         ...
 
     def __getitem__(self, index: np.ndarray | slice) -> "BatchPolicy":
-        """The members that a mask `(robots,)` or a slice names."""
+        """The members that a mask `(robots,)` or a slice selects."""
         ...
 
 
@@ -236,7 +236,7 @@ class Everybody:
     """A batch policy whose members are all the same."""
 
     def __init__(self, policy: Policy):
-        """Name the policy of them all."""
+        """Store the policy of all members."""
         self._policy = policy
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
@@ -244,7 +244,7 @@ class Everybody:
         return self._policy(observation)
 
     def __getitem__(self, index: np.ndarray | slice) -> Self:
-        """Itself."""
+        """The policy itself, as all members are the same."""
         return self
 
     def started(self, n: int | None) -> BatchPolicy:
@@ -268,10 +268,10 @@ def run_trials(
         policy: one member per start.
         starts: poses `(trials, 3)`: x, y [m], yaw [rad].
         task: what a trial is.
-        lost: asked after every step which trials to break off, uncrashed, with what
-            they have earned so far; None lets all of them live, as a step fitness
-            without a maximum does.
-        watcher: told of starts and steps; None if nobody watches.
+        lost: asked after every step which trials to end early, without a crash and
+            with their fitness so far; None ends none, nor does a step fitness without
+            a maximum.
+        watcher: told of starts and steps; None for no watcher.
     """
     n_trials = len(starts)
     fitness = np.zeros(n_trials)

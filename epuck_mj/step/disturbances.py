@@ -1,4 +1,4 @@
-"""Disturbances: in what a robot and its day differ from the robot of the books.
+"""Disturbances: how a robot differs from the nominal one, and its noise.
 
 Plain arrays, drawn before a trial begins: so a trial in them can be repeated, and all
 individuals of a generation can meet the same ones.
@@ -48,7 +48,7 @@ whose uniform 5 % have a standard deviation of 3 %.
 
 @dataclass(frozen=True)
 class Ranges:
-    """From where to where robots differ, lowest and highest.
+    """Ranges in which robots differ, lowest and highest.
 
     Attributes:
         gain: counts of a proximity sensor against the mean one's.
@@ -68,7 +68,7 @@ class Ranges:
 
 
 BOOK = Ranges()
-"""All robots are the one of the books."""
+"""Ranges with the nominal robot only."""
 
 RANGES = Ranges(
     gain=(0.6, 1.5),
@@ -78,7 +78,7 @@ RANGES = Ranges(
     friction=(0.7, 1.2),
     latency=(0, 3),
 )
-"""Of randomised robots.
+"""Ranges of randomised robots.
 
 Source: gains of JBotEvolver's eight sensors; wheel radii of Webots and of ARGoS, as
 driven; tracks of Enki and of a fit for ROS 2. Mass, friction and latency are chosen.
@@ -87,7 +87,7 @@ driven; tracks of Enki and of a fit for ROS 2. Mass, friction and latency are ch
 
 @dataclass(frozen=True, eq=False)
 class Disturbances:
-    """What `(n,)` trials meet; several may meet the same, one of `(k,)`.
+    """Disturbances of `(n,)` trials, each one of `(k,)`, which trials may share.
 
     Attributes:
         of: which of the `k` each trial meets, `(n,)`.
@@ -140,12 +140,12 @@ class Disturbances:
         return len(self.of)
 
     def __getitem__(self, index: np.ndarray | slice) -> Self:
-        """Those of some trials, in numpy's sense."""
+        """The disturbances of some trials, by numpy's indexing."""
         arrays = {field.name: getattr(self, field.name) for field in fields(self)}
         return type(self)(**{**arrays, "of": self.of[index]})
 
     def tiled(self, times: int) -> Self:
-        """The same for each of `times` individuals, one after the other."""
+        """The disturbances repeated for each of `times` individuals."""
         return self[np.tile(np.arange(len(self)), times)]
 
 
@@ -156,7 +156,7 @@ def draw_disturbances(
     noise: Noise,
     ranges: Ranges = BOOK,
 ) -> Disturbances:
-    """Disturbances of `n` trials, each its own.
+    """Draw disturbances of `n` trials, each with its own robot.
 
     Args:
         rng: where they come from.
@@ -189,7 +189,7 @@ def draw_calibrated(
     steps: int,
     noise: Noise,
 ) -> Disturbances:
-    """Disturbances of `n` trials of one robot, of which we know in what it differs.
+    """Draw disturbances of `n` trials of one calibrated robot.
 
     As on the bridge, its sensors' gains are undone, and its wheels' are not.
 

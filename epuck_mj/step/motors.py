@@ -1,4 +1,4 @@
-"""From what the network says to what the wheels are told, and make of it."""
+"""Motors: from the network's action to commands and true wheel speeds."""
 
 from dataclasses import dataclass
 
@@ -16,12 +16,12 @@ from epuck_mj.constants import (
 )
 
 STEP_ANGLE = 2 * np.pi / STEPS_PER_REVOLUTION
-"""What a wheel turns by in one step of its motor [rad]."""
+"""Angle by which a wheel turns in one step of its motor [rad]."""
 
 
 @dataclass(frozen=True)
 class Speeds:
-    """What a full action means: v = 1 and |w| = 1 in SI units.
+    """Speeds of a full action: v = 1 and |w| = 1 in SI units.
 
     Attributes:
         forward: speed at v = 1 [m/s].

@@ -1,4 +1,4 @@
-"""From what the robot senses to what the network sees.
+"""Sensors: from a robot's readings to the network's observation.
 
 Everything above this line is the same in simulation and on the robot.
 """
@@ -21,7 +21,7 @@ _NOISE = np.array(list(PROXIMITY_COUNT_NOISE.values()))
 
 @dataclass(frozen=True)
 class Reading:
-    """What a robot reports at the end of a control step.
+    """Reading of a robot at the end of a control step.
 
     Attributes:
         distance: metres along each proximity ray from the shell, `(..., 8)`;
@@ -30,7 +30,7 @@ class Reading:
         proximity: counts that `distance` comes from, `(..., 8)`; None of sensors that
             measure distance itself.
         truth: metres along the rays as they are, `(..., 8)`; None where `distance` is
-            that, or where nobody knows.
+            that, or if unknown.
     """
 
     distance: np.ndarray
@@ -40,7 +40,7 @@ class Reading:
 
 
 def proximity(distance: np.ndarray, gains: np.ndarray | float = 1.0) -> np.ndarray:
-    """What sensors of real robots count, free of noise, `(..., 8)`.
+    """Counts of real robots' sensors, without noise, `(..., 8)`.
 
     Args:
         distance: metres along each ray, `(..., 8)`; negative is "nothing hit".
@@ -75,7 +75,7 @@ def counted(
 
 
 def sensed_distance(counts: np.ndarray, gains: np.ndarray | float = 1.0) -> np.ndarray:
-    """Metres along each ray that counts speak of, `(..., 8)`: undoes `proximity`.
+    """Distances along the rays from counts [m], `(..., 8)`: inverts `proximity`.
 
     Few counts are far away: the farthest distance that was ever measured.
 

@@ -1,1 +1,1 @@
-"""What happened in trials: recorded, measured, put into classes."""
+"""Trials recorded, measured and put into behaviour classes."""

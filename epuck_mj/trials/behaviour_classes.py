@@ -1,4 +1,4 @@
-"""Behaviour classes: each trial gets one name for what the robot did in it.
+"""Behaviour classes: one name per trial for the robot's behaviour.
 
 The first class of the table that fits is the trial's. Failures come first: a robot
 that ends in a wall or in a corner is no wall follower, however well it began. Then
@@ -20,19 +20,19 @@ from epuck_mj.trials.metrics import (
 )
 
 SPOT = BODY_RADIUS
-"""Farthest that a robot on the spot gets [m]: it still stands where it stood."""
+"""Farthest that a robot on the spot gets from its start [m]."""
 
 ROUND = 2 * np.pi
-"""Least turn of spinners and circlers [rad]: all the way round once."""
+"""Least turn of spinners and circlers [rad]: one full turn."""
 
 CIRCLER_NEAR_WALL = 0.5
-"""Largest share near walls of a circler: it circles in the open."""
+"""Largest share of time near walls of a circler, which circles in the open."""
 
 HUG = 0.005
 """Clearance below which a follower hugs [m]: less than a real robot's errors."""
 
 BOUNCES = 3
-"""Least visits of a bouncer: one is an odd start, another one the end of a search."""
+"""Least visits to walls of a bouncer: followers may have two."""
 
 OTHER = "other"
 
@@ -59,7 +59,7 @@ CLASSES: MappingProxyType[str, Callable[[Behaviour], np.ndarray]] = MappingProxy
         "searcher": lambda b: ~(b.time - b.time_to_first_wall >= FOLLOWING_TIME),
     }
 )
-"""Name and predicate of each class, in order of precedence; `other` fits the rest."""
+"""Name and predicate of each class, in order of precedence; the rest is `other`."""
 
 MEANINGS: MappingProxyType[str, str] = MappingProxyType(
     {
@@ -76,7 +76,7 @@ MEANINGS: MappingProxyType[str, str] = MappingProxyType(
         OTHER: "none of these",
     }
 )
-"""The same in words, for readers."""
+"""Meanings of the classes in words."""
 
 
 def behaviour_classes(behaviour: Behaviour) -> np.ndarray:

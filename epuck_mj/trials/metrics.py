@@ -1,8 +1,8 @@
-"""Metrics: what robots did in their trials, from true geometry, not from sensors.
+"""Metrics of trials, from true geometry, not from sensors.
 
 A robot is near a wall if its shell has at most the proximity range to it. Shares and
 means are over the control steps lived, each with the pose at its end; NaN where there
-is nothing to take a mean of.
+are no steps to average.
 """
 
 from dataclasses import dataclass, fields
@@ -19,23 +19,23 @@ SUCCESS_LAPS = 1.0
 """Least laps of a success. Source: our reading of the paper, behaviour metrics."""
 
 FOLLOWING_SHARE = 0.7
-"""Least share of the time since the first wall to be near one: likewise."""
+"""Least share of time near walls since the first wall, of a success."""
 
 FOLLOWING_SPEED = 0.25
-"""Least mean net progress along walls since then, as a share of the top speed.
+"""Least mean net progress along walls since the first one, as a share of top speed.
 
 In place of a lap, which 30 s in the paper's arena hardly have room for. A follower that
 turns about once on its way still has it; random controllers have a tenth.
 """
 
 FOLLOWING_TIME = 3.0
-"""Least time since then [s]: less shows a meeting with a wall, not following."""
+"""Least time since the first wall [s]: less is a touch of a wall, not following."""
 
 LEAVING_CLEARANCE = 0.06
-"""Clearance that ends a visit to a wall [m]: at the range itself it would flicker."""
+"""Clearance that ends a visit to a wall [m], above the range to avoid flicker."""
 
 LAST_TIME = 5.0
-"""How long the end of a trial is [s]: a look at whether the robot still moves."""
+"""Duration of the end of a trial, in which it is seen whether robots still move [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +189,7 @@ def _mean_of(values: np.ndarray) -> float:
 
 
 def _visits(distance: np.ndarray) -> np.ndarray:
-    """Times `(n,)` that clearance `(n, rows)` came near after having been away."""
+    """Number of visits `(n,)` to walls, from clearance `(n, rows)`."""
     near = distance <= PROXIMITY_RANGE
     decided = near | (distance >= LEAVING_CLEARANCE)
     # in between, what was decided last holds
@@ -199,13 +199,13 @@ def _visits(distance: np.ndarray) -> np.ndarray:
 
 
 def _farthest(poses: np.ndarray, origin: np.ndarray) -> np.ndarray:
-    """Farthest from their `(n, 1, 3)` origin that `(n, rows, 3)` poses are [m]."""
+    """Largest distance of poses `(n, rows, 3)` from an origin `(n, 1, 3)` [m]."""
     offset = (poses - origin)[..., :2]
     return np.nan_to_num(np.hypot(offset[..., 0], offset[..., 1])).max(axis=1)
 
 
 def _reach_at_end(tracks: Tracks, n_last: int) -> np.ndarray:
-    """Farthest from the last pose in the last `n_last` steps [m], `(n,)`."""
+    """Largest distance from the last pose in the last `n_last` steps [m], `(n,)`."""
     rows = np.maximum(tracks.steps[:, None] - np.arange(n_last + 1), 0)
     last = np.take_along_axis(tracks.pose, rows[..., None], axis=1)
     return _farthest(last, last[:, :1])

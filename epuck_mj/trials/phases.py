@@ -1,4 +1,4 @@
-"""Phases: what a robot is about at each moment of a trial, by true geometry."""
+"""Phases: what a robot does at each moment of a trial, by true geometry."""
 
 import numpy as np
 
@@ -7,20 +7,20 @@ from epuck_mj.trials.trajectory import Trajectory
 
 SEARCHING, FOLLOWING = "searching", "following"
 CORNERING, CRASHED = "cornering", "crashed"
-"""Away from walls; near one; near one and turning; in one."""
+"""Names of the phases: away from walls; near one; near one and turning; crashed."""
 
 CORNERING_TIME = 1.0
-"""Time around a moment in which a turn is looked at [s]: no wiggle counts."""
+"""Time around a moment in which turns are summed [s], to ignore wiggles."""
 
 CORNERING_TURN = np.pi / 6
-"""Least net turn in that time of a robot that takes a corner [rad].
+"""Least net turn in CORNERING_TIME of a robot that takes a corner [rad].
 
 At full speed, a wall of less than a quarter of a metre radius.
 """
 
 
 def phases(trajectory: Trajectory, clearance: np.ndarray) -> np.ndarray:
-    """Phase of each row of what is sensed, `(T + 1,)`.
+    """Phase of each sensed row, `(T + 1,)`.
 
     Args:
         trajectory: what happened.

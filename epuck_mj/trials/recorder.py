@@ -1,7 +1,7 @@
-"""The recorder: trials as they are lived, written into arrays.
+"""The recorder: trials written into arrays while they are simulated.
 
-Tracks and trajectories come from the same loop, `run_trials`, the one of evolution: on
-every rung, with or without disturbances, to the last bit what was evaluated.
+Tracks and trajectories come from `run_trials`, the loop of evolution. So on every rung,
+with or without disturbances, they are bit-identical to what was evaluated.
 """
 
 from collections.abc import Mapping
@@ -63,7 +63,7 @@ def record_trajectories(
     task: TaskParameters,
     disturbances: Disturbances | None = None,
 ) -> list[Trajectory]:
-    """All that a policy did and sensed in one trial per start.
+    """Record trajectories of a policy, one trial per start.
 
     Args:
         scene: robot and arena.
@@ -105,7 +105,7 @@ def record(
     task: TaskParameters,
     disturbances: Disturbances | None = None,
 ) -> Trajectory:
-    """All that a policy did and sensed in a trial from one start `(3,)`.
+    """Record the trajectory of a policy from one start `(3,)`.
 
     The other arguments are those of `record_trajectories`.
     """
@@ -121,7 +121,7 @@ def _recorded(
     disturbances: Disturbances | None,
     rows: Mapping[str, np.ndarray],
 ) -> Trials:
-    """The outcome of one trial per start, each step of which is written into `rows`."""
+    """Run one trial per start and write each step into `rows`; the outcome."""
     parts = []
     for first in range(0, len(starts), robots.capacity):
         members = slice(first, first + robots.capacity)
@@ -136,7 +136,7 @@ def _recorded(
 
 @dataclass(frozen=True)
 class _Writer:
-    """Writes what `rows` have a place for; row 0 of what is sensed is the start."""
+    """Writer of the quantities in `rows`; row 0 of sensed quantities is the start."""
 
     robots: Robots
     rows: Mapping[str, np.ndarray]

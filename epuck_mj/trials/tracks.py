@@ -1,6 +1,6 @@
-"""Tracks: where many robots went in one trial each, as plain arrays.
+"""Tracks: paths of many robots in one trial each, as plain arrays.
 
-What metrics need of a trial and no more; a `Trajectory` has all of a single one.
+Tracks hold only what metrics need; a `Trajectory` holds everything of one trial.
 """
 
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ class Tracks:
 
     @property
     def trial_fitness(self) -> np.ndarray:
-        """Sum of the step fitness, `(n,)`: to the last bit that of `run_trials`."""
+        """Sum of the step fitness, `(n,)`, bit-identical to that of `run_trials`."""
         # in the order of the steps: numpy's sum has an order of its own
         earned = np.where(self.lived, self.fitness, 0.0)
         return np.cumsum(earned, axis=1)[:, -1]

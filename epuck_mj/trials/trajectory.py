@@ -1,4 +1,4 @@
-"""Trajectories: all that one robot did and sensed in one trial, as plain arrays.
+"""Trajectories: everything one robot did and sensed in one trial, as plain arrays.
 
 The neutral record of a trial, stored as .npz; figures and recordings are views of it.
 """
@@ -91,11 +91,11 @@ class Trajectory:
 
     @property
     def trial_fitness(self) -> float:
-        """Sum of the step fitness: to the last bit what `run_trials` reports."""
+        """Sum of the step fitness, bit-identical to that of `run_trials`."""
         return float(self.cumulative_fitness[-1]) if self.steps else 0.0
 
     def save(self, path: str | Path) -> None:
-        """Write an .npz; equal trajectories make equal files.
+        """Write the trajectory as .npz; equal trajectories make equal files.
 
         Raises:
             UserError: if it cannot be written.
@@ -121,7 +121,7 @@ class Trajectory:
 
 
 def hidden_outputs(policy: Policy, observations: np.ndarray) -> np.ndarray:
-    """What was inside a policy, `(T, hidden)`: of one without a network, `(T, 0)`.
+    """Outputs of hidden neurons, `(T, hidden)`; `(T, 0)` without a network.
 
     Args:
         policy: that saw the observations, one after the other.

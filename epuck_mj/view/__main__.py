@@ -1,8 +1,8 @@
 """A champion in MuJoCo's own viewer: `python -m epuck_mj.view my.xml champion.json`.
 
-It drives at real time, trial after trial on new starts, until the window is closed. A
-crash ends a trial. What the window shows is the trial itself, step by step: the same
-start gives the trajectory of `epuck_mj.trials.recorder.record`, to the last bit.
+The champion drives at real time, trial after trial on new starts, until the window is
+closed. A crash ends a trial. A trial in the window is bit-identical to the trajectory
+of `epuck_mj.trials.recorder.record` from the same start.
 """
 
 import itertools
@@ -37,26 +37,26 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Options:
-    """Watch a controller drive in MuJoCo's viewer, until its window is closed."""
+    """Watch a controller drive in MuJoCo's viewer until the window is closed."""
 
     arena: tyro.conf.Positional[Annotated[str, word("ARENA")]]
-    """name of a shipped arena, or path of an MJCF"""
+    """name of a shipped arena, or path of an MJCF file"""
     champion: tyro.conf.Positional[Annotated[Path | None, word("RUN")]] = None
-    """controller file (JSON); the wall follower written by hand by default"""
+    """controller file (JSON); the hand-written wall follower by default"""
     robot: Annotated[str, word("ROBOT")] = "epuck"
-    """name of a shipped robot, or path of an MJCF"""
+    """name of a shipped robot, or path of an MJCF file"""
     pose: Annotated[tuple[float, float, float] | None, word("X Y DEGREES")] = None
-    """start of every trial: x, y [m], heading [degrees]; random ones by default"""
+    """start of every trial: x, y [m] and heading [degrees]; random starts by default"""
     seconds: Annotated[float | None, word("SECONDS")] = None
     """duration of a trial [s]; the controller's own by default"""
     seed: int = 0
-    """seed of the random starts and of noise"""
+    """seed of random starts and noise"""
     robots: ConditionFlags = field(default_factory=ConditionFlags)
-    """what the robot is like; as the champion's was, if its config.yaml is beside it"""
+    """noise and differences of the robot; by default those in config.yaml beside it"""
 
 
 def view(argv: Sequence[str]) -> int:
-    """Watch; the exit status."""
+    """Run the command line; its exit status."""
     options = parse(Options, "python -m epuck_mj.view", argv, examples=EXAMPLES)
     policy: Policy = WallFollower()
     task = TaskParameters()
@@ -98,7 +98,7 @@ def view(argv: Sequence[str]) -> int:
 
 
 def _evolved_with(champion: Path) -> Conditions | None:
-    """What a champion's robots were like, as the config of its run beside it says."""
+    """Conditions of a champion's robots, from the config.yaml beside its file."""
     config = champion.with_name("config.yaml")
     if not is_file(config):
         return None
@@ -115,7 +115,7 @@ def _evolved_with(champion: Path) -> Conditions | None:
 
 
 def _starts(scene: "Scene", options: Options) -> Iterator[np.ndarray]:
-    """Where trials start, for ever.
+    """Endless starts of trials.
 
     Raises:
         UserError: if the arena has no room, or the pose is not one.

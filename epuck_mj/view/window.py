@@ -1,4 +1,4 @@
-"""MuJoCo's viewer as a window: opened, kept at real time, closed in order."""
+"""MuJoCo's viewer in a window at real time."""
 
 import importlib
 import re
@@ -19,17 +19,17 @@ from epuck_mj.step.control import Policy, TaskParameters, drive
 from epuck_mj.step.disturbances import Disturbances
 
 LATE_MAX = 0.2
-"""How late the picture may be before time that was lost is given up [s]."""
+"""Delay of the picture beyond which lost time is not made up for [s]."""
 
 CLOSING_MAX = 5.0
 """How long the viewer's own thread may take to end [s]."""
 
 
 class Clock:
-    """Lets simulated time pass no faster than real time."""
+    """Clock that lets simulated time pass no faster than real time."""
 
     def __init__(self) -> None:
-        """Start now."""
+        """Start the clock."""
         self._due = time.perf_counter()
 
     def wait(self, seconds: float) -> None:
@@ -51,7 +51,7 @@ def watch(
     task: TaskParameters,
     meet: Callable[[], Disturbances | None] = lambda: None,
 ) -> Iterator[str]:
-    """Trials in a window until it is closed or no start is left; a line for each.
+    """Show trials in a window until it is closed or no start is left; print each.
 
     Args:
         window: MuJoCo's handle of its viewer: `sync`, `is_running`.
@@ -113,7 +113,7 @@ def open_window(model: mujoco.MjModel, data: mujoco.MjData) -> Iterator[Any]:
         ) from None
     try:
         with window.lock():
-            # rays go on for ever; controllers see four centimetres of them
+            # rays have no end; controllers see four centimetres of them
             window.opt.flags[mujoco.mjtVisFlag.mjVIS_RANGEFINDER] = False
         yield window
     finally:

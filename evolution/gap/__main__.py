@@ -29,10 +29,10 @@ class GapOptions:
 
     Attributes:
         paths: run or study directories, controller files, or wall-follower.
-        output: folder to write gap.md, summary.md, gap.json, gap.csv and figures into.
-        worlds: how many.
-        starts: test starts in each world, and at home.
-        robot: robot that drives; both shipped ones if not given.
+        output: folder for gap.md, summary.md, gap.json, gap.csv and figures.
+        worlds: number of worlds.
+        starts: number of test starts in each world and at home.
+        robot: robot that drives; both shipped robots if not given.
         threads: threads that step the robots; 0 is one per core. Changes no result.
     """
 

@@ -1,4 +1,4 @@
-"""The figure of the gap: how much is kept in how many worlds."""
+"""Figure of the gap: in how many worlds policies keep how much fitness."""
 
 import matplotlib
 import numpy as np
@@ -12,11 +12,11 @@ from evolution.pages.words import robot_name
 DASHES = ("-", (0, (7, 2)), (0, (2, 1.5)), (0, (7, 1.5, 1.2, 1.5)))
 
 SHARE_END = 1.2
-"""End of the axis of shares; noise helps some."""
+"""End of the axis of shares, which may exceed 1."""
 
 
 def kept_figure(gap: Gap) -> Figure:
-    """A panel per robot, a line per experiment."""
+    """Figure with a panel per robot and a line per experiment."""
     with matplotlib.rc_context(PRINT):
         figure = Figure(figsize=(PAGE, 2.9), layout="constrained")
         panels = figure.subplots(1, len(gap.transfers), sharey=True, squeeze=False)[0]

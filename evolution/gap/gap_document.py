@@ -1,4 +1,4 @@
-"""The document of the gap: a table per robot, and how ranks agree."""
+"""Document about the gap: a table per robot, and rank correlations."""
 
 import numpy as np
 
@@ -24,7 +24,7 @@ GROUP_COLUMNS = (
 
 
 def gap_summary(gap: Gap) -> Table:
-    """A row per experiment and robot: medians over its policies of their means."""
+    """Table with a row per experiment and robot: medians of its policies' means."""
     rows = []
     for group, members in gap.groups.items():
         speeds = [s for s, each in gap.peers.items() if set(each) & set(members)]
@@ -56,7 +56,7 @@ def gap_summary(gap: Gap) -> Table:
 
 
 def by_latency(gap: Gap) -> Table:
-    """Mean shares kept when commands are late: a row per experiment and robot."""
+    """Table of mean shares kept by latency, with a row per experiment and robot."""
     late = np.unique(gap.latency)
     rows = []
     for group, members in gap.groups.items():
@@ -68,7 +68,7 @@ def by_latency(gap: Gap) -> Table:
 
 
 def gap_document(gap: Gap) -> list[Block]:
-    """The document: what was found, as blocks."""
+    """Blocks of the document about the gap."""
     blocks: list[Block] = [
         Heading("The reality gap", 1),
         Paragraph(
@@ -107,7 +107,7 @@ def gap_document(gap: Gap) -> list[Block]:
 
 
 def _ranks(gap: Gap) -> list[Block]:
-    """Rank correlations in words; no block if all policies are too few."""
+    """Rank correlations in words; no block if there are too few policies."""
     items = []
     for speed, members in gap.peers.items():
         for robot, transfer in gap.transfers.items():

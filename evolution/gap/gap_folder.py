@@ -1,4 +1,4 @@
-"""The folder of the gap: who is tested in which worlds, and what is written of it."""
+"""The folder of the gap: tests of policies in worlds, and the files about them."""
 
 import json
 import sys
@@ -22,7 +22,7 @@ from evolution.pages.csv_text import csv_text
 from evolution.pages.figure_files import write_figure
 
 Measured = tuple[list[Outcome], list[list[Outcome]], list[list[Outcome]]]
-"""At home, as ideal robots in each world's arena, in each world; one per policy."""
+"""Outcomes at home, on ideal robots in each world's arena, and in each world."""
 
 
 def write_gap(
@@ -33,7 +33,7 @@ def write_gap(
     starts: int,
     threads: int,
 ) -> None:
-    """Measure policies in worlds, and write all that was found.
+    """Measure policies in worlds and write the results.
 
     Args:
         folder: an existing one.
@@ -120,7 +120,7 @@ def _rows(
     places: Sequence[World],
     transfers: dict[str, Transfer],
 ) -> str:
-    """A row per robot, policy and world."""
+    """Rows of gap.csv, one per robot, policy and world."""
     rows = [
         {
             "robot": robot,

@@ -1,4 +1,4 @@
-"""Which policies belong together: of one experiment, of one speed."""
+"""Groups of policies: of one experiment, or of one speed."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from evolution.study.directory import PREFIX
 
 
 def experiments(policies: Sequence[NamedPolicy]) -> dict[str, list[int]]:
-    """Runs of one experiment together, by its name; by its path if others share it."""
+    """Policies by experiment, named by its path if experiments share a name."""
     places: dict[Path, list[int]] = {}
     for i, policy in enumerate(policies):
         path = Path(policy.source)
@@ -23,7 +23,7 @@ def experiments(policies: Sequence[NamedPolicy]) -> dict[str, list[int]]:
 
 
 def peers(policies: Sequence[NamedPolicy]) -> dict[str, list[int]]:
-    """Policies of one full speed together, by that.
+    """Policies by their full speed.
 
     A slower one earns less at home and keeps more of it wherever it is: in one ranking
     that would pass for a relation of the two.

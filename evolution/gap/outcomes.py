@@ -1,4 +1,4 @@
-"""What champions are worth in each world, and as ideal robots."""
+"""Outcomes of champions in worlds, and on ideal robots."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ from evolution.named_policies import NamedPolicy
 
 @dataclass(frozen=True)
 class Outcome:
-    """A policy in a world.
+    """Fitness and collisions of a policy in a world.
 
     Attributes:
         fitness: mean step fitness over the whole time of a trial, in [0, 1].
@@ -37,7 +37,7 @@ def ideal(
     threads: int,
     arena: str | None = None,
 ) -> list[Outcome]:
-    """Each policy on an ideal robot, on `n` test starts, in one arena or its own."""
+    """Outcomes of policies on ideal robots, on `n` test starts."""
     scenes = cache(lambda arena, step: load_scene(robot, arena, step))
     free = cache(FreeSpace)
     outcomes = []
@@ -58,7 +58,7 @@ def abroad(
     n: int,
     threads: int,
 ) -> Iterator[list[Outcome]]:
-    """All policies in one world after the other, on `n` test starts.
+    """Outcomes of all policies in each world, on `n` test starts.
 
     They all meet the same robot and the same noise; a trial lasts as long as at home.
     """
@@ -85,7 +85,7 @@ def abroad(
 
 
 def _scene(world: World, robot: str) -> tuple[Scene, float]:
-    """A world's scene, and its period in whole physics steps [s]."""
+    """A world's scene, and its period, rounded to whole physics steps [s]."""
     step = load_scene(robot, world.arena).model.opt.timestep
     period = round(max(1, round(world.period / step)) * step, 9)
     return load_scene(robot, world.arena, period), period

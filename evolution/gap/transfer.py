@@ -1,4 +1,4 @@
-"""What of champions survives: shares, collisions, ranks, each with its uncertainty."""
+"""Transfer of champions: shares kept, collisions and ranks, with uncertainties."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,12 +17,12 @@ SHARE_KEPT = 0.8
 """Least share of its fitness that a policy keeps in a world it masters."""
 
 COLLISIONS_MAX = 1.0
-"""Collisions per minute from which on a policy has not mastered a world."""
+"""Collisions per minute at which a policy has not mastered a world."""
 
 
 @dataclass(frozen=True, eq=False)
 class Transfer:
-    """Policies `(p,)` in worlds `(w,)`.
+    """Fitness and collisions of policies `(p,)` in worlds `(w,)`.
 
     Attributes:
         home: mean step fitness at home, `(p,)`.
@@ -73,7 +73,7 @@ class Transfer:
 
     @property
     def mastered_against_home(self) -> np.ndarray:
-        """Worlds mastered if the share of fitness at home is what counts, `(w, p)`."""
+        """Which worlds each policy masters against its fitness at home, `(w, p)`."""
         return self._mastered(_share(self.fitness, self.home))
 
     def _mastered(self, share: np.ndarray) -> np.ndarray:
@@ -103,7 +103,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class Verdict:
-    """One policy in all worlds.
+    """Summary of one policy in all worlds.
 
     Attributes:
         home: mean step fitness at home.
@@ -121,7 +121,7 @@ class Verdict:
 
 
 def verdict(transfer: Transfer, policy: int) -> Verdict:
-    """What the worlds say of one policy."""
+    """Summarise one policy in all worlds."""
     rng = np.random.default_rng(0)
     share, mastered = transfer.share[:, policy], transfer.mastered[:, policy]
     return Verdict(
@@ -136,7 +136,7 @@ def verdict(transfer: Transfer, policy: int) -> Verdict:
 def rank_correlations(
     transfer: Transfer, members: Sequence[int]
 ) -> dict[str, float] | None:
-    """Spearman's correlations of the ranks of policies; None if they are too few.
+    """Spearman's rank correlations of policies; None if there are too few.
 
     `home`: between home and a world, the mean over the worlds. `worlds`: between two
     worlds, the mean over all pairs. Worlds where all fare alike say nothing.

@@ -1,4 +1,4 @@
-"""Worlds: pseudo-realities, spread evenly over what may be different on a robot."""
+"""Worlds: pseudo-realities, spread evenly over differences of robots."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ from epuck_mj.step.disturbances import Disturbances
 from evolution.settings.randomness import random_generator
 
 WORLD_SEED = 0
-"""Seed of the worlds, which are the same for every champion and every study."""
+"""Seed of the worlds, which are the same for all champions and studies."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ WORLD_RANGES: dict[str, tuple[float, float]] = {
     "mass": disturbances.RANGES.mass,
     "friction": disturbances.RANGES.friction,
 }
-"""Lowest and highest of what is continuous.
+"""Lowest and highest values of the continuous quantities.
 
 Source: the figures of books and drivers differ by so much (those of randomised robots
 in evolution), and so do the gains of eight sensors of two robots.
@@ -96,7 +96,7 @@ def worlds(n: int) -> list[World]:
 
 
 def met(world: World, index: int, n: int, steps: int) -> Disturbances:
-    """What `n` trials of `steps` control steps meet in a world: one robot, new noise.
+    """Disturbances of `n` trials of `steps` steps in a world: one robot, new noise.
 
     Args:
         world: the pseudo-reality.

@@ -1,1 +1,1 @@
-"""What a genome is worth: evaluation, held-out tests, scores."""
+"""Judging: evaluation of genomes, held-out tests, scores."""

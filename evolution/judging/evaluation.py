@@ -1,11 +1,11 @@
-"""Genomes to fitness: every individual of a generation lives the same trials.
+"""Evaluation: fitness of genomes, all of a generation on the same trials.
 
 Two engines with the same bits: `batch` steps all robots at once on
 `mujoco.batch.Batch`; `dm_control` steps the dm_control task, one trial after another.
 
-Racing: an individual that only matters if it beats a known fitness is broken off as
-soon as it no longer can, since no control step is worth more than 1. Whoever beats
-what it has to has lived all its trials, so no comparison comes out differently.
+Racing: an individual that only matters if it exceeds a known fitness is ended as soon
+as it cannot reach that any more, since no control step is worth more than 1. One that
+exceeds it has all its trials, so every comparison has the same outcome.
 """
 
 from collections.abc import Iterator
@@ -28,13 +28,13 @@ from epuck_mj.step.control import (
 from epuck_mj.step.disturbances import Disturbances
 
 CAPACITY = 512
-"""Robots simulated at once: changes no result. More of them leave the cache.
+"""Number of robots simulated at once, which fit the cache. Changes no result.
 
 An individual with more trials is not raced.
 """
 
 ROUNDING = 1e-9
-"""By how much an individual must have lost its race: sums of floats are inexact."""
+"""Margin by which an individual must have lost its race, for rounding errors."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,9 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Race:
-    """What individuals `(individuals,)` have to beat; their trials follow one another.
+    """Fitness that individuals `(individuals,)` have to exceed to be kept.
+
+    The trials of an individual follow one another.
 
     Attributes:
         to_beat: fitness to exceed, -inf where every fitness matters.
@@ -72,7 +74,7 @@ class Race:
     trials: int
 
     def lost(self, most: np.ndarray) -> np.ndarray:
-        """Which trials `(individuals * trials,)` need not go on.
+        """Which trials `(individuals * trials,)` can end, as their individual has lost.
 
         Args:
             most: what each of them can still reach.
@@ -88,7 +90,7 @@ class Race:
 
 @dataclass(frozen=True)
 class Work:
-    """Trials `(n,)` to be lived.
+    """Trials `(n,)` to be simulated.
 
     Attributes:
         controller: one per trial.
@@ -107,7 +109,7 @@ class Work:
         return len(self.starts)
 
     def __getitem__(self, chunk: slice) -> "Work":
-        """Some of the trials; in a race, of whole individuals."""
+        """Select trials; in a race, those of whole individuals."""
         race, met = self.race, self.disturbances
         return Work(
             self.controller[chunk],
@@ -117,7 +119,7 @@ class Work:
         )
 
     def chunks(self, most: int) -> Iterator["Work"]:
-        """The same in parts of at most so many trials.
+        """Parts of the work of at most so many trials.
 
         Individuals that race stay whole: they win or lose by all their trials.
         """
@@ -128,15 +130,15 @@ class Work:
 
 
 class Engine(Protocol):
-    """Runs one trial per member of a batch of controllers."""
+    """Interface of engines, which run one trial per member of a batch policy."""
 
     def run(self, work: Work) -> Trials:
-        """Outcome of `(n,)` trials."""
+        """Run `(n,)` trials; their outcome."""
         ...
 
 
 class BatchEngine:
-    """All trials at once, on threads."""
+    """Engine that runs all trials at once, on threads."""
 
     def __init__(self, scene: Scene, task: TaskParameters, threads: int = 0):
         """Allocate the robots; `threads` 0 is one per core."""
@@ -146,7 +148,7 @@ class BatchEngine:
     def run(self, work: Work) -> Trials:
         """See `Engine.run`."""
         if work.race is not None and work.race.trials > self._robots.capacity:
-            # an individual does not fit: nobody is broken off
+            # an individual does not fit: none is ended early
             work = replace(work, race=None)
         parts = [
             run_trials(
@@ -162,21 +164,21 @@ class BatchEngine:
 
 
 class DmControlEngine:
-    """One trial after the other, on the dm_control task itself."""
+    """Engine that runs one trial after the other, on the dm_control task."""
 
     def __init__(self, scene: Scene, task: TaskParameters):
-        """Remember the scene; an environment lives as long as a call of `run`."""
+        """Store the scene; each call of `run` makes an environment."""
         self._scene = scene
         self._task = task
 
     def run(self, work: Work) -> Trials:
-        """See `Engine.run`; every trial is lived to its end, by an ideal robot.
+        """See `Engine.run`; every trial runs to its end, with an ideal robot.
 
         Raises:
             ValueError: if there are disturbances.
         """
         if work.disturbances is not None:
-            raise ValueError("expected no disturbances: dm_control has ideal robots")
+            raise ValueError("expected no disturbances with engine dm_control")
         # dm_control for those who use it
         from epuck_mj.environments.dm_control import FollowWalls, environment
 
@@ -203,16 +205,16 @@ def evaluate(
     to_beat: np.ndarray | None = None,
     disturbances: Disturbances | None = None,
 ) -> Evaluation:
-    """All individuals on all starts.
+    """Evaluate all individuals on all starts.
 
     Args:
         engine: what runs the trials.
         topology: what genomes decode to.
         genomes: `(individuals, genes)`.
-        starts: poses `(trials, 3)`, x, y [m], yaw [rad]: the same for everybody.
-        to_beat: fitness `(individuals,)` below which nobody cares how far below;
-            None if every fitness matters.
-        disturbances: of the trials, the same for everybody; None for ideal robots.
+        starts: poses `(trials, 3)`, x, y [m], yaw [rad], for all individuals.
+        to_beat: fitness `(individuals,)` that each has to exceed to matter; None if
+            every fitness matters.
+        disturbances: of the trials, for all individuals; None for ideal robots.
     """
     shape = (len(genomes), len(starts))
     controller = topology.decode(np.repeat(genomes, len(starts), axis=0))

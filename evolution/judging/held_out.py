@@ -1,6 +1,6 @@
-"""Held-out evaluation: what fresh starts say of a controller, and what it does there.
+"""Held-out evaluation: fitness and behaviour of a controller on new starts.
 
-The numbers that a study reports.
+These are the numbers that a study reports.
 """
 
 from pathlib import Path
@@ -25,25 +25,25 @@ from evolution.settings.setting import Setting
 from evolution.statistics.estimates import mean_interval, worst_share_mean
 
 INTERVAL_SEED = 0
-"""Of the bootstrap's resamples, so that the same trials give the same interval."""
+"""Seed of the bootstrap, so that the same trials give the same interval."""
 
 
 def tested_on(robot: str) -> list[str]:
-    """Robots that champions of a robot are tested on: itself, and the other kind."""
+    """Robots on which a robot's champions are tested: that robot and the other kind."""
     other = PLANAR_ROBOT if robot == WHEELED_ROBOT else WHEELED_ROBOT
     return list(dict.fromkeys([robot, other]))
 
 
 class Judges:
-    """The judge of each robot in each setting, made by the first who asks."""
+    """Judges by robot and setting, each made at its first use."""
 
     def __init__(self, threads: int = 0):
-        """Make none yet; `threads` step the robots, 0 is one per core."""
+        """Start without judges; `threads` step the robots, 0 is one per core."""
         self._threads = threads
         self._made: dict[tuple[str, Setting], Judge] = {}
 
     def add(self, robot: str, setting: Setting, scene: Scene, space: FreeSpace) -> None:
-        """Make a judge of what is there already.
+        """Add a judge that uses an existing scene and engine.
 
         Args:
             robot: name or path of the robot.
@@ -55,7 +55,7 @@ class Judges:
         self._made[robot, setting] = judge
 
     def of(self, robot: str, setting: Setting) -> "Judge":
-        """The judge of a robot, a name or a path, in a setting.
+        """The judge of a robot, given by name or path, in a setting.
 
         Raises:
             UserError: if the robot cannot use the arena, the arena has no room, or a
@@ -68,7 +68,7 @@ class Judges:
         return self._made[robot, setting]
 
     def tested_on(self, robot: str, setting: Setting) -> dict[str, "Judge"]:
-        """The judges of a robot's champions by robot: its own first.
+        """The judges of a robot's champions, by robot, that robot first.
 
         Raises:
             UserError: as `of`.
@@ -77,7 +77,7 @@ class Judges:
 
 
 class Judge:
-    """Tests controllers in one scene."""
+    """Judge that tests controllers in one scene."""
 
     def __init__(
         self, scene: Scene, space: FreeSpace, task: TaskParameters, threads: int = 0
@@ -110,7 +110,7 @@ class Judge:
         n: int,
         disturbances: Disturbances | None = None,
     ) -> HeldOut:
-        """What the first `n` test starts say of a policy, one for all of them.
+        """Test a policy on the first `n` test starts.
 
         Args:
             policy: to test.

@@ -1,4 +1,4 @@
-"""Fresh starts: on which champions are chosen, and those on which they are tested.
+"""Held-out starts: those on which champions are chosen, and those of their tests.
 
 Both sets are fixed, the same for all runs, and never used in evolution.
 """
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from epuck_mj.scene.starts import FreeSpace
 
 HELD_OUT_SEED = 0
-"""Seed of validation and test starts: no run's seed reaches their streams."""
+"""Seed of validation and test starts, whose streams no run uses."""
 
 
 def starts_for_validation(space: "FreeSpace", n: int = N_VALIDATION) -> np.ndarray:
@@ -25,14 +25,14 @@ def starts_for_validation(space: "FreeSpace", n: int = N_VALIDATION) -> np.ndarr
 
 
 def starts_for_test(space: "FreeSpace", n: int = N_TEST) -> np.ndarray:
-    """The first `n` of the starts on which champions are reported, `(n, 3)`."""
+    """The first `n` of the starts on which champions are tested, `(n, 3)`."""
     return space.sample(random_generator(HELD_OUT_SEED, Purpose.TEST), n)
 
 
 def held_out_disturbances(
     conditions: Conditions, purpose: Purpose, n: int, steps: int
 ) -> Disturbances | None:
-    """What champions meet in `n` trials of `steps`, from the first start on.
+    """Disturbances of champions in `n` held-out trials of `steps` control steps.
 
     The first are the same for any `n` up to the default; for more, all are others.
     """

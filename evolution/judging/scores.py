@@ -1,7 +1,7 @@
-"""Scores: what a champion is worth, as its file says it.
+"""Scores of champions, as in their files.
 
-Read with `read`, which refuses what is no score, and written with `to_dict`, which
-leaves out what is not known.
+`read` reads scores and refuses invalid ones. `to_dict` gives the known scores as plain
+values.
 """
 
 import math
@@ -16,11 +16,11 @@ from epuck_mj.scene.model_files import WHEELED_ROBOT
 
 
 class _Record(BaseModel, frozen=True, allow_inf_nan=False):
-    """Values that are read from a file and written to one."""
+    """Record that is read from a file and written to one."""
 
     @classmethod
     def read(cls, fields: Mapping[str, Any], path: Path) -> Self:
-        """What the file at `path` says; keys that are unknown say nothing.
+        """Read the record from fields of the file at `path`; ignore unknown keys.
 
         Raises:
             UserError: naming the first value that is missing or no score.
@@ -33,12 +33,12 @@ class _Record(BaseModel, frozen=True, allow_inf_nan=False):
             raise UserError(f"'{path}' is damaged: {where}: {first['msg']}") from None
 
     def to_dict(self) -> dict[str, Any]:
-        """All that is known as plain values, in the order of the attributes."""
+        """The known values, in the order of the attributes."""
         return self.model_dump(exclude_unset=True)
 
 
 class HeldOut(_Record, frozen=True):
-    """A controller on `starts` fresh starts.
+    """Test of a controller on `starts` held-out starts.
 
     Older files know less: there, numbers are nan and mappings empty.
 
@@ -100,7 +100,7 @@ class Believed(_Record, frozen=True):
 
 
 class Scores(_Record, frozen=True):
-    """What a champion is worth.
+    """Scores of a champion.
 
     Attributes:
         stored: fitness that evolution believes in.
@@ -117,7 +117,7 @@ class Scores(_Record, frozen=True):
     held_out_as_evolved: Mapping[str, HeldOut] = {}
 
     def in_lines(self, most: float | None) -> str:
-        """The champion's held-out fitness, and why others are higher, in lines.
+        """Lines with the champion's held-out fitness, and why others are higher.
 
         Args:
             most: fitness that a trial can reach; None if that is not known.
@@ -149,7 +149,7 @@ class Scores(_Record, frozen=True):
 
     @property
     def in_short(self) -> str:
-        """Held-out fitness on each robot and stored fitness, in part of a line."""
+        """Part of a line with held-out fitness on each robot and stored fitness."""
         return f"held-out {_in_words(self.held_out)}; stored {self.stored:.1f}"
 
 
@@ -161,14 +161,14 @@ def _in_words(tests: Mapping[str, HeldOut]) -> str:
 
 
 class KnownScores(Scores, frozen=True):
-    """Scores of any policy: all may be unknown, stored and held-out fitness as well."""
+    """Scores of any policy, of which each may be unknown."""
 
     stored: StrictFloat = math.nan
     held_out: Mapping[str, HeldOut] = {}
 
     @classmethod
     def found_in(cls, fields: Mapping[str, Any]) -> Self:
-        """Scores of a file that anybody may have made; what is none is left out."""
+        """Scores in a file by any program; invalid ones are left out."""
         sound = dict(fields)
         while True:
             try:

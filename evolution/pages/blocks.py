@@ -86,7 +86,7 @@ Block = Heading | Paragraph | Listing | Code | Table | Picture
 
 
 def to_markdown(blocks: Sequence[Block]) -> str:
-    """The document in GitHub's Markdown, which links the pictures."""
+    """The document in GitHub's Markdown, with links to the pictures."""
     return "\n\n".join(_markdown(block) for block in blocks) + "\n"
 
 
@@ -112,7 +112,7 @@ def _markdown(block: Block) -> str:
 
 
 def _escaped(text: str) -> str:
-    """Plain text of one line that Markdown shows as it is."""
+    """Plain text of one line, escaped for Markdown."""
     text = " ".join(text.split())
     # the others are marks only beside certain neighbours: numbers stay readable
     marks = r"[\\`*|]|<(?=[\w/!?])|\](?=[(\[:])|~(?=~)|&(?=[\w#])|#(?=#*$)"
@@ -121,13 +121,13 @@ def _escaped(text: str) -> str:
 
 
 def _begun(text: str) -> str:
-    """Plain text at the beginning of a block, where more marks make it another."""
+    """Plain text escaped for the beginning of a block in Markdown."""
     marks = r"^(?=[-+#>])|^\d+(?=[.)](?: |$))"
     return re.sub(marks, r"\g<0>\\", _escaped(text))
 
 
 def to_html(title: str, blocks: Sequence[Block]) -> str:
-    """The document as a page that needs nothing else: no script, no request.
+    """The document as a page in one file, without scripts and requests.
 
     Args:
         title: of the window.

@@ -16,7 +16,7 @@ FORMATS: Mapping[str, Mapping[str, None]] = {
     "pdf": {"Creator": None, "Producer": None, "CreationDate": None},
     "png": {"Software": None},
 }
-"""File formats, each with what to leave out of it."""
+"""File formats, each with the metadata to leave out."""
 
 
 def write_figure(figure: Figure, folder: Path, name: str) -> None:

@@ -1,4 +1,4 @@
-"""How the figures of a study look: one look per experiment, made for print.
+"""Style of a study's figures, for print: one look per experiment.
 
 Figures have the size they are printed at, so that text keeps its size.
 """
@@ -41,7 +41,7 @@ PRINT: dict[Any, Any] = {
     # equal figures make equal files
     "svg.hashsalt": "epuck-mj",
 }
-"""Settings under which figures are both made and saved: ticks are made late."""
+"""Settings of matplotlib with which figures are made and saved."""
 
 HANDLE, LETTER = 0.5, 0.054
 """Width of a legend's handle with its gaps, and of a letter beside it [inch]."""
@@ -52,7 +52,7 @@ Dashes = tuple[float, tuple[float, ...]] | str
 
 @dataclass(frozen=True)
 class Look:
-    """How an experiment is drawn in every figure.
+    """Colour, line and marker of an experiment in all figures.
 
     Attributes:
         color: in [0, 1].
@@ -73,7 +73,7 @@ LOOKS: Mapping[str, Look] = {
     "one-plus-one-es": Look(fraction(colors.ORANGE), (0, (4, 1, 1, 1, 1, 1)), "v"),
     "random-search": Look(fraction(colors.GREY), (0, (1, 1)), ">"),
 }
-"""Shipped experiments; any other takes a spare look."""
+"""Looks of shipped experiments; others take a spare look."""
 
 # without yellow, which white paper swallows
 SPARE_COLORS = (colors.SKY, colors.ORANGE, colors.PURPLE)
@@ -112,7 +112,7 @@ def with_count(name: str, n: int) -> str:
 
 
 def counts(data: StudyData) -> str:
-    """How many runs each experiment has, for a caption."""
+    """Text for a caption with the number of runs of each experiment."""
     runs = data.with_runs
     sizes = {len(each) for each in runs.values()}
     if len(sizes) == 1:

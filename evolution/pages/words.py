@@ -1,4 +1,4 @@
-"""Numbers of a report as a person reads them, and what may be said of them."""
+"""Numbers and names of a report in words."""
 
 import math
 import shlex
@@ -16,7 +16,7 @@ LABELS: Mapping[str, str] = {
     "one-plus-one-es": "(1+1)-ES",
     "random-search": "random search",
 }
-"""Names of shipped experiments; any other is called by its own."""
+"""Names of shipped experiments for readers."""
 
 PAPERS = ("de-best", "de-rand", "ga")
 """The experiments of the paper."""
@@ -29,7 +29,7 @@ ROBOT_NAMES: Mapping[str, str] = {
 YARDSTICK_LABEL = "hand-written wall follower"
 
 NOTHING = "-"
-"""Stands for what is not known."""
+"""Text that stands for an unknown value."""
 
 
 def label(experiment: str) -> str:
@@ -47,7 +47,7 @@ SPREAD = f"Median [quartiles] over runs (below {FEWEST_FOR_INTERVAL}: every run)
 
 
 def spread(sample: np.ndarray, scale: float = 1.0, form: str = "z.1f") -> str:
-    """Median and quartiles of `(n,)`; of few values, which have none, all of them."""
+    """Text with median and quartiles of `(n,)`, or with all values if they are few."""
     if not sample.size:
         return NOTHING
     if sample.size == 1:
@@ -63,7 +63,7 @@ def _listed(sample: np.ndarray, form: str) -> str:
 
 
 def median_and_quartiles(sample: np.ndarray, unit: str = "") -> str:
-    """Median and quartiles of `(n,)` for a sentence."""
+    """Text with median and quartiles of `(n,)`, for a sentence."""
     found = quartiles(sample)
     text = f"median {found.median:.1f}{unit}"
     if sample.size == 1:
@@ -74,7 +74,7 @@ def median_and_quartiles(sample: np.ndarray, unit: str = "") -> str:
 
 
 def between(interval: Interval, form: str = ".2f") -> str:
-    """The bounds of an interval, or that there are none."""
+    """Text with the bounds of an interval, or that there are none."""
     low, high = interval.low, interval.high
     if math.isnan(low) or math.isnan(high):
         return "(too few runs for an interval)"
@@ -82,7 +82,7 @@ def between(interval: Interval, form: str = ".2f") -> str:
 
 
 def percent(share: float | None) -> str:
-    """A share in percent; None and nan are not known."""
+    """Text of a share in percent; None and nan are unknown."""
     return NOTHING if share is None or math.isnan(share) else f"{share:.1%}"
 
 
@@ -102,5 +102,5 @@ def evaluations(n: float | None) -> str:
 
 
 def command_line(module: str, *arguments: str) -> str:
-    """The line that runs a module of ours, whatever interpreter made the report."""
+    """Shell command that runs a module, the same for every interpreter."""
     return shlex.join(["python", "-m", module, *arguments])

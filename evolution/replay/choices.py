@@ -1,4 +1,4 @@
-"""Where replayed trials happen: the scene and the starts that a person asks for."""
+"""Scene and starts of replayed trials, as asked for."""
 
 import math
 import re
@@ -26,7 +26,7 @@ from evolution.settings.randomness import Purpose
 
 @dataclass(frozen=True)
 class Starts:
-    """Starts that trials begin from.
+    """Starts of replayed trials.
 
     Attributes:
         names: of each, `n` of them.
@@ -41,14 +41,14 @@ class Starts:
     first: int = 0
 
     def met(self, conditions: Conditions, steps: int) -> Disturbances | None:
-        """What trials from here meet: as in the held-out test of all starts."""
+        """Disturbances of trials from these starts, as in the held-out test."""
         end = self.first + len(self.names)
         met = held_out_disturbances(conditions, self.purpose, end, steps)
         return None if met is None else met[self.first :]
 
 
 def numbered_starts(spec: str, scene: Scene, clearance: float) -> Starts:
-    """Starts that a person names, such as `test:0-9` or `validation:3`.
+    """Starts by name, such as `test:0-9` or `validation:3`.
 
     Raises:
         UserError: if it names none.
@@ -75,7 +75,7 @@ def numbered_starts(spec: str, scene: Scene, clearance: float) -> Starts:
 
 
 def scene_for(options: Options, policies: Sequence[NamedPolicy]) -> Scene:
-    """The one scene that everybody drives in.
+    """The scene in which all policies drive.
 
     Raises:
         UserError: if the policies do not agree on it.
@@ -108,8 +108,8 @@ def starts_for(
         raise UserError("expected one of --trials, --starts and --pose, got several")
     if not policies and (any(ways) or options.generations is not None):
         raise UserError(
-            "expected a policy for --trials, --starts, --pose or --generations: a "
-            "recorded trajectory is what it is"
+            "expected a policy with --trials, --starts, --pose or --generations, got a "
+            "recorded trajectory"
         )
     if options.pose:
         if len(options.pose) != 3 or not np.isfinite(options.pose).all():
@@ -132,7 +132,7 @@ def starts_for(
 
 
 def _pose(scene: Scene, x: float, y: float, degrees: float) -> np.ndarray:
-    """A pose `(3,)` between the walls, wherever they are."""
+    """A pose `(3,)`, refused outside the walls."""
     lower, upper = arena_box(scene.model)
     if not ((lower[:2] <= (x, y)) & ((x, y) <= upper[:2])).all():
         raise UserError(

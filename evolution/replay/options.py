@@ -1,4 +1,4 @@
-"""What a person may ask of `python -m evolution.replay`."""
+"""Options of `python -m evolution.replay`."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,27 +13,28 @@ from epuck_mj.step.conditions import ConditionFlags
 
 @dataclass(frozen=True)
 class Options:
-    """Watch champions drive: in the rerun viewer, a browser, a video or a picture.
+    """Watch champions drive in the rerun viewer, a browser, a video or a picture.
 
-    Without --save, --web, --video and --image, the recording is written beside what is
-    replayed, and the viewer opens if there is a display.
+    Without --save, --web, --video and --image, the recording is written into the run
+    directory or beside the file, and the viewer opens if there is a display.
 
     Attributes:
         path: run directory, controller file, wall-follower, or a recorded trajectory
             (.npz) of a simulated or a real robot.
-        compare: more of them, in the same arena at the same time.
-        generations: instead of champions, the best individuals of these generations of
-            the runs: numbers from 0 on and last, with commas in between.
-        trials: on how many test starts.
-        starts: on which starts instead, such as test:0-9 or validation:7.
-        pose: on which start instead: x [m], y [m] and heading [degrees].
+        compare: more of these, shown in the same arena at the same time.
+        generations: show the best individuals of these generations instead of the
+            champions: numbers from 0 on, or last, separated by commas.
+        trials: number of trials, on the first test starts.
+        starts: starts to use instead, such as test:0-9 or validation:7.
+        pose: one start to use instead: x [m], y [m] and heading [degrees].
         robot: robot that drives.
-        arena: arena to drive in; the one it evolved in if not given.
-        robots: what the robots are like; as a champion's were if not given.
-        save: write the recording here (.rrd).
-        web: write it as a web page into this folder, and serve that on 127.0.0.1.
-        video: write a video here (.mp4); needs EGL or OSMesa.
-        image: write a picture of the end here (.png); needs EGL or OSMesa.
+        arena: arena to drive in; if not given, the one that the champion evolved in.
+        robots: noise and differences of the robots; if not given, those that the
+            champion evolved with.
+        save: file to write the recording to (.rrd).
+        web: folder to write a web page into, which is then served on 127.0.0.1.
+        video: file to write a video to (.mp4); needs EGL or OSMesa.
+        image: file to write a picture of the end to (.png); needs EGL or OSMesa.
     """
 
     path: tyro.conf.Positional[Annotated[str, word("RUN")]] = ""

@@ -1,4 +1,4 @@
-"""What a replay is shown as: a recording, a window, a page, a video or a picture."""
+"""Outputs of a replay: a recording, a window, a page, a video or a picture."""
 
 import sys
 import webbrowser
@@ -22,7 +22,7 @@ IMAGE_SIZE, VIDEO_SIZE = (1200, 800), (960, 640)
 
 
 def outcome(trial: Trial) -> str:
-    """What came of a trial, as a line."""
+    """Line with the fitness and the end of a trial."""
     trajectory = trial.trajectory
     end = f", crash after {trajectory.time[-1]:.1f} s" if trajectory.crashed else ""
     return (
@@ -32,7 +32,7 @@ def outcome(trial: Trial) -> str:
 
 
 def text_panel(trials: Sequence[Trial], policies: Sequence[NamedPolicy]) -> str:
-    """The text panel: what is shown, then what is known of who drives."""
+    """Text panel with the trials, then what is known of each policy."""
     lines = [f"- {outcome(trial)}" for trial in trials]
     known = [described(policy) for policy in policies]
     return "\n".join(["# Trials", "", *lines, "", *known])
@@ -40,7 +40,7 @@ def text_panel(trials: Sequence[Trial], policies: Sequence[NamedPolicy]) -> str:
 
 @dataclass(frozen=True)
 class Replay:
-    """What is to be shown."""
+    """Trials to show, with their scene, title and summary."""
 
     scene: Scene
     trials: Sequence[Trial]
@@ -54,7 +54,7 @@ class Replay:
 
 
 def show(options: Options, replay: Replay, path: str) -> None:
-    """Write what was asked for; the recording and a window if nothing was."""
+    """Write the outputs asked for; by default a recording, which is opened."""
     trajectories = [trial.trajectory for trial in replay.trials]
     if options.save is not None:
         replay.save(options.save)
@@ -76,18 +76,18 @@ def show(options: Options, replay: Replay, path: str) -> None:
 
 
 def _open(recording: Path) -> None:
-    """The viewer, or how to get one."""
+    """Open the viewer, or print how to view the recording."""
     how = f"watch it: {shell_command('rerun', recording)}"
     if not display_there():
         print(f"{recording}; there is no display here; {how}")
     elif reason := open_viewer(recording):
         print(f"{recording}; the viewer did not open ({reason}); {how}")
     else:
-        print(f"{recording}, in the viewer")
+        print(f"{recording}, shown in the viewer")
 
 
 def _make_folder(path: Path) -> None:
-    """Of a file that is to be written: before the work, not behind it."""
+    """Make the folder of a file before the work that the file is for."""
     with writing():
         path.parent.mkdir(parents=True, exist_ok=True)
 
@@ -118,7 +118,7 @@ def _film(path: Path, scene: Scene, trajectories: Sequence) -> None:
 
 
 def _serve(folder: Path) -> None:
-    """The page, until Ctrl-C."""
+    """Write the web page and serve it until Ctrl-C."""
     write_page(folder)
     with server(folder) as web:
         address = f"http://{LOOPBACK}:{web.server_port}/"

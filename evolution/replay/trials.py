@@ -1,4 +1,4 @@
-"""What is replayed: trials of policies on starts, and trajectories from files."""
+"""Replayed trials: of policies on starts, or from trajectory files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +16,7 @@ from evolution.named_policies import NamedPolicy
 from evolution.replay.choices import Starts
 
 TRIALS_MAX = 50
-"""Most trials of one recording: nobody could tell more apart."""
+"""Most trials of one recording."""
 
 
 def simulated(
@@ -25,7 +25,7 @@ def simulated(
     starts: Starts,
     conditions: Conditions | None = None,
 ) -> list[Trial]:
-    """A trial of each policy on each start.
+    """Simulate a trial of each policy on each start.
 
     Args:
         scene: robot and arena.
@@ -78,7 +78,7 @@ def from_file(path: str) -> Trial:
 
 
 def labels(policies: Sequence[NamedPolicy]) -> list[str]:
-    """Short names of policies: the end of their paths, if that tells them apart."""
+    """Short names of policies: the ends of their paths, if these differ."""
     sources = dict.fromkeys(policy.source for policy in policies)
     ends = {source: "/".join(Path(source).parts[-2:]) for source in sources}
     if len(set(ends.values())) < len(ends):

@@ -1,4 +1,4 @@
-"""Rerun's viewer in a window of its own, which outlives this process."""
+"""Rerun's viewer in a window that stays open after this process."""
 
 import importlib.util
 import os
@@ -11,15 +11,15 @@ from pathlib import Path
 from epuck_mj.errors import UserError
 
 SETTLING_TIME = 2.0
-"""How long a viewer that cannot open its window may take to say so [s]."""
+"""Time in which a viewer that cannot open its window ends [s]."""
 
 
 BINARIES = ("rerun", "rerun.exe", "Rerun.app/Contents/MacOS/Rerun")
-"""Where the wheel has the viewer; its Python script cannot be stopped with it."""
+"""Paths of the viewer's program in rerun's package."""
 
 
 def viewer_binary() -> Path:
-    """The viewer itself.
+    """The viewer's program.
 
     Raises:
         UserError: if it is not there.
@@ -33,14 +33,14 @@ def viewer_binary() -> Path:
 
 
 def display_there() -> bool:
-    """Whether a window can be opened, as far as one can tell without trying."""
+    """Whether there is a display to open a window on."""
     if sys.platform in ("darwin", "win32"):
         return "SSH_CONNECTION" not in os.environ
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def open_viewer(recording: Path) -> str | None:
-    """Show a recording; None, or why there is no viewer."""
+    """Show a recording in the viewer; None, or why the viewer did not open."""
     with tempfile.TemporaryFile() as output:
         try:
             viewer = subprocess.Popen(
@@ -66,7 +66,7 @@ def open_viewer(recording: Path) -> str | None:
 
 
 def _last_line(output) -> str:
-    """The last thing that a process said."""
+    """The last line that a process wrote."""
     output.seek(0)
     lines = output.read().decode(errors="replace").strip().splitlines()
     return lines[-1].strip() if lines else "it ended without a word"

@@ -27,19 +27,19 @@ if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
 
 VIEWER_PATIENCE = 60.0
-"""How long the viewer may take to do what it is asked for [s]."""
+"""How long the viewer may take for each request [s]."""
 
 Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
 class ViewerPictureOptions:
-    """Draw what the rerun viewer shows of a recording, without a window.
+    """Write a picture of a recording in the rerun viewer, without opening a window.
 
     Attributes:
-        recording: of trials (.rrd).
+        recording: recording of trials (.rrd).
         output: picture to write (PNG).
-        time: of the trial that is shown [s].
+        time: time of the trial that is shown [s].
         size: width and height of the viewer [pixels].
     """
 
@@ -101,7 +101,7 @@ def headless_viewer(recording: Path, size: tuple[int, int]) -> Iterator["ViewerC
 
 
 def viewer_screenshot(client: "ViewerClient", time: float) -> bytes:
-    """What the viewer shows at a time of the trial [s], once it has settled, as PNG."""
+    """PNG of the viewer's window at a time of the trial [s], once it is at rest."""
     client.set_time("sim_time", duration=time, play_state="paused")
     shots = [client.take_screenshot()]
 
@@ -113,7 +113,7 @@ def viewer_screenshot(client: "ViewerClient", time: float) -> bytes:
 
 
 def _until(attempt: Callable[[], Value | None]) -> Value:
-    """What an attempt gives, as soon as that is something."""
+    """Repeat an attempt until it gives a result; that result."""
     end = time.monotonic() + VIEWER_PATIENCE
     while (value := attempt()) is None:
         if time.monotonic() > end:

@@ -1,7 +1,7 @@
 """A recording as a web page: a folder that any web server can publish.
 
 The viewer is the one in rerun's wheel. It is served by rerun itself and not stored as
-files, so the folder gets copies. The page keeps it from calling anybody.
+files, so the folder gets copies. The page keeps it from contacting other servers.
 """
 
 import functools
@@ -18,14 +18,14 @@ from evolution.replay.viewer import viewer_binary
 
 LOOPBACK = "127.0.0.1"
 PARTS = ("re_viewer.js", "re_viewer_bg.wasm")
-"""The viewer's files."""
+"""Names of the viewer's files."""
 
 PATIENCE = 20.0
-"""How long rerun may take to hand the viewer out [s]; it takes a tenth of one."""
+"""How long rerun may take to serve the viewer's files [s]."""
 
 
 def write_page(folder: Path) -> None:
-    """Put viewer and page into a folder, beside its replay.rrd.
+    """Write viewer and page into a folder that has a replay.rrd.
 
     Raises:
         UserError: if that is not possible.
@@ -39,14 +39,14 @@ def write_page(folder: Path) -> None:
 
 
 def server(folder: Path) -> http.server.ThreadingHTTPServer:
-    """A server of the folder for this machine only, on a free port."""
+    """Serve the folder to this machine only, on a free port."""
     handler = functools.partial(_Quiet, directory=str(folder))
     return http.server.ThreadingHTTPServer((LOOPBACK, 0), handler)
 
 
 class _Quiet(http.server.SimpleHTTPRequestHandler):
     def log_message(self, format: str, *args: object) -> None:
-        """Nothing: a person waits for Ctrl-C in that terminal."""
+        """Print no requests, to keep the terminal clear."""
 
 
 def _viewer() -> dict[str, bytes]:
@@ -71,7 +71,7 @@ def _viewer() -> dict[str, bytes]:
 
 
 def free_ports(n: int) -> list[int]:
-    """Ports that nobody listens on just now."""
+    """Free ports of this machine."""
     sockets = [socket.create_server((LOOPBACK, 0)) for _ in range(n)]
     ports = [listener.getsockname()[1] for listener in sockets]
     for listener in sockets:
@@ -80,7 +80,7 @@ def free_ports(n: int) -> list[int]:
 
 
 def _fetched(address: str, until: float) -> bytes:
-    """What is at an address, as soon as somebody answers there."""
+    """Content of an address, as soon as a server answers there."""
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     while True:
         try:
@@ -88,5 +88,5 @@ def _fetched(address: str, until: float) -> bytes:
                 return response.read()
         except OSError as error:
             if time.monotonic() > until:
-                raise UserError(f"rerun did not hand out its viewer: {error}") from None
+                raise UserError(f"cannot read rerun's viewer: {error}") from None
             time.sleep(0.05)

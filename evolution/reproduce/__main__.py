@@ -1,6 +1,6 @@
 """The whole study by one command: `python -m evolution.reproduce --quick`.
 
-Runs the study, reports it, and holds each of the paper's claims against it.
+Runs the study, reports it, and tests each of the paper's claims on it.
 """
 
 import sys
@@ -29,17 +29,17 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class ReproduceOptions:
-    """Redo the paper's comparison, and say which of its claims hold.
+    """Repeat the paper's comparison and report which of its claims hold.
 
-    Writes studies, reports and REPRODUCTION.md; call it again to go on.
+    Writes studies, reports and REPRODUCTION.md. Call it again to continue.
 
     Attributes:
-        quick: three seeds and a twentieth of the budget: ten minutes on two cores.
-            Shows that everything works, and no more.
-        full: 30 seeds, and 3 evolved on wheels: days on two cores.
-        output: directory of it all.
-        study: run nothing; write what this study directory says into --output.
-        wheels: with --study, the study directory of runs evolved on wheels.
+        quick: run three seeds with a twentieth of the budget, about ten minutes on two
+            cores. Shows only that everything works.
+        full: run 30 seeds, and 3 seeds evolved on wheels, days on two cores.
+        output: directory for everything that is written.
+        study: run nothing and report this study directory instead.
+        wheels: with --study, the study directory of the runs evolved on wheels.
     """
 
     quick: bool = False

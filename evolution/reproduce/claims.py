@@ -1,4 +1,4 @@
-"""The paper's claims held against a study: our number, its interval, n, a verdict."""
+"""The paper's claims tested on a study: our number, its interval, n, a verdict."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -33,10 +33,10 @@ PAPER_BEST = {"de-best": 246.66, "de-rand": 215.217, "ga": 202.775}
 """Maximum fitness of each algorithm. Source: the paper, section 5."""
 
 REPLICATES = 3
-"""Runs of which that is the best: "at least three"; of more it would be rarer low."""
+"""Number of runs of which the paper reports the best: "at least three"."""
 
 NEAR = 2 / 3
-"""Share of the best from which on a mean has approached it: our reading."""
+"""Share of the best above which a mean approaches it: our reading."""
 
 MATURE = 0.9
 """Share of its final best at which a run has mature individuals: our reading."""
@@ -47,7 +47,7 @@ EARLY = (0.5, 1 / 3)
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim and what became of it.
+    """One claim with our number and the verdict.
 
     Attributes:
         text: what the paper says.
@@ -63,7 +63,7 @@ class Claim:
 
 
 def claims(study: StudyData) -> list[Claim]:
-    """All claims of the paper, held against a study."""
+    """Test all claims of the paper on a study."""
     stored = _samples(study, study.best_stored)
     shares = _samples(study, lambda name: 100 * mean_to_best(study, name))
     where = "in the mean's share of the best [%]"
@@ -82,7 +82,7 @@ def claims(study: StudyData) -> list[Claim]:
 
 
 def held_out_order(study: StudyData, robot: str) -> list[Claim]:
-    """The paper's order in what the paper did not measure, as the report decides it.
+    """Test the paper's order of algorithms on held-out fitness, as the report does.
 
     There p values are adjusted for all pairs of the study, baselines included.
     """
@@ -100,7 +100,7 @@ def _shipped() -> Mapping[str, ExperimentConfig]:
 
 
 def unlike(study: StudyData) -> list[str]:
-    """What makes experiments others than the paper's, a line each; robots are free."""
+    """Differences of experiments from the paper's except robots, a line each."""
     shipped, lines = _shipped(), []
     for name in PAPERS:
         if name not in study.configs:
@@ -124,7 +124,7 @@ def mean_to_best(study: StudyData, name: str) -> np.ndarray:
 
 
 def maturity(study: StudyData, name: str) -> np.ndarray:
-    """Share of what it spent after which a run has 90 % of its best, `(runs,)`."""
+    """Share of its evaluations after which a run has 90 % of its best, `(runs,)`."""
     shares = []
     for run in study.runs[name]:
         best = np.maximum.accumulate(run.history["best"])
@@ -135,21 +135,21 @@ def maturity(study: StudyData, name: str) -> np.ndarray:
 
 
 def tally(found: Sequence[Claim]) -> dict[str, int]:
-    """How many claims came out which way, the most frequent way first."""
+    """Number of claims by verdict, the most frequent first."""
     return dict(Counter(claim.verdict for claim in found).most_common())
 
 
 def _samples(
     study: StudyData, value: Callable[[str], np.ndarray]
 ) -> dict[str, np.ndarray]:
-    """A sample per algorithm of the paper; empty where the study has none."""
+    """Samples of the paper's algorithms, empty where the study has no runs."""
     return {
         name: value(name) if study.runs.get(name) else np.zeros(0) for name in PAPERS
     }
 
 
 def _of_the_paper(study: StudyData, found: Sequence[Claim]) -> list[Claim]:
-    """The claims, none of them tested by other experiments than the paper's."""
+    """The claims, untested if the experiments differ from the paper's."""
     if not unlike(study):
         return list(found)
     return [Claim(each.text, "-", each.n, OTHER_STUDY) for each in found]
@@ -164,7 +164,7 @@ def _pairs(study: StudyData, samples: dict[str, np.ndarray]) -> list[Comparison]
 def _orders(
     rows: Sequence[Comparison], samples: dict[str, np.ndarray], where: str
 ) -> list[Claim]:
-    """DE/best before DE/rand, DE/best before the GA, DE/rand before the GA."""
+    """Claims that DE/best exceeds DE/rand and the GA, and DE/rand the GA."""
     by_pair, found = {(row.a, row.b): row for row in rows}, []
     for pair in (("de-best", "de-rand"), ("de-best", "ga"), ("de-rand", "ga")):
         better, worse = pair
@@ -179,7 +179,7 @@ def _orders(
 
 
 def _maximum(stored: dict[str, np.ndarray], name: str) -> Claim:
-    """Whether the paper's maximum has a place among those of our runs."""
+    """Claim that an algorithm reaches the paper's maximum."""
     sample, paper = stored[name], PAPER_BEST[name]
     text = f"{label(name)} reaches a maximum fitness of {paper}"
     return _claim(text, sample, lambda: of_best(sample, paper, REPLICATES))
@@ -215,7 +215,7 @@ def _mature_early(early: dict[str, np.ndarray], name: str) -> Claim:
 
 
 def _follows(study: StudyData, name: str) -> Claim:
-    """Finds a wall, follows it, does not crash: on wheels."""
+    """Claim that champions find and follow walls on wheels without crashing."""
     text = (
         f"{label(name)}'s champion finds a wall and follows it without crashing "
         f"(read as: {FOLLOWED:.0%} of its trials on {WHEELED_ROBOT} are a wall "
@@ -235,7 +235,7 @@ def _claim(
     judged: Callable[[], tuple[str, str]],
     quantity: str = "",
 ) -> Claim:
-    """A claim about one algorithm.
+    """Make a claim about one algorithm.
 
     Args:
         text: what the paper says.

@@ -1,4 +1,4 @@
-"""What differs from the original: the paper beside the shipped experiments."""
+"""Differences between the paper and the shipped experiments."""
 
 from evolution.pages.blocks import Block, Listing, Paragraph, Table
 from evolution.reproduce.claims import PAPER, unlike
@@ -63,7 +63,7 @@ DIFFERENCES = (
 
 
 def differences_from_paper(study: StudyData) -> list[Block]:
-    """A table of the differences, and in what a study differs from the shipped one."""
+    """Table of the differences, and differences of a study from the shipped one."""
     shipped = StudyConfig.load(find_study(PAPER)).experiments
     best, ga = shipped["de-best"], shipped["ga"]
     values = {"base": best, "best": best.optimizer, "ga": ga.optimizer}

@@ -1,4 +1,4 @@
-"""Why equation (2) is not taken as printed: what it gives controllers not yet evolved.
+"""First generations by each fitness: why equation (2) is not taken as printed.
 
 As printed, turning costs nothing away from walls, so a robot that drives circles in the
 open is near the maximum before evolution has begun.
@@ -12,12 +12,12 @@ from evolution.run.generation_loop import Evolution
 from evolution.settings.config import ExperimentConfig
 
 FRESH_STARTS = 100
-"""Starts of the test of its best individual."""
+"""Number of starts on which the best individual is tested."""
 
 
 @dataclass(frozen=True)
 class FirstGeneration:
-    """The best of a population as it was drawn, by one fitness function.
+    """The best individual of a first population by one fitness function.
 
     Attributes:
         fitness: name of the step fitness.
@@ -35,7 +35,7 @@ class FirstGeneration:
 
 
 def first_generation(config: ExperimentConfig, fitness: str) -> FirstGeneration:
-    """What a fitness function thinks of the first generation of an experiment.
+    """Evaluate the first generation of an experiment by a fitness function.
 
     Raises:
         UserError: if robot or arena cannot be used.

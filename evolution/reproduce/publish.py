@@ -1,35 +1,42 @@
 """Ships the studies in runs/: `python -m evolution.reproduce.publish`.
 
-Copies what of each finished run is small enough for git, reports it, holds the paper's
-claims against it, and puts its table into the README.
+Copies the small files of each finished run, writes the reports and the verdicts on the
+paper's claims, and puts the tables into the README and the pages of docs/.
 """
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse
+from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.reproduce.__main__ import reproduce_paper
 from evolution.run.directory import RunDirectory
 from evolution.study.directory import StudyDirectory
 
 REPORTED = ("paper", "wheels")
-"""Folders of runs/ and results/, and what stands between the README's markers."""
+"""Studies that are reported: folders of runs/ and results/, and names of tables."""
 
 TRANSFER = "transfer"
-"""The study of robots that differ; the gap measures it."""
+"""Study of evolution with real sensors and motors, which the gap measures."""
 
-README_FILE = Path("README_FILE.md")
+PAGES: Mapping[str, tuple[str, ...]] = {
+    "README.md": ("medians",),
+    "docs/findings.md": ("paper", "wheels"),
+    "docs/transfer.md": ("gap",),
+}
+"""Pages that show results, and the names of their tables."""
 
 
 @dataclass(frozen=True)
 class PublishOptions:
-    """Ship the finished runs of the studies in runs/; to be called at the top.
+    """Copy the finished runs of runs/ to results/ and write all reports and tables.
 
-    Without these folders, everything is made anew from what was shipped before.
+    Run it in the repository's top folder. Without runs/, reports and tables are written
+    again from results/.
     """
 
 
@@ -44,13 +51,13 @@ def publish(argv: Sequence[str]) -> int:
     paper, *others = (str(path) for path in shipped(Path("results")))
     wheels = [argument for path in others for argument in ("--wheels", path)]
     reproduce_paper(["--study", paper, *wheels, "--output", "results"])
-    text = with_tables(README_FILE.read_text(encoding="utf-8"), Path("results"))
-    files.write_text(README_FILE, text)
+    for page, text in pages_with_tables(Path()).items():
+        files.write_text(page, text)
     return 0
 
 
 def shipped(results: Path) -> list[Path]:
-    """The studies that are there."""
+    """Paths of the shipped studies."""
     return [results / name for name in REPORTED if (results / name).is_dir()]
 
 
@@ -85,32 +92,51 @@ def _kept(run: RunDirectory) -> list[Path]:
     ]
 
 
-def with_tables(text: str, results: Path) -> str:
-    """The README's text with every table as the shipped studies have it now.
+def pages_with_tables(root: Path) -> dict[Path, str]:
+    """Texts of the pages below `root`, with the tables of the shipped results.
 
     Raises:
-        UserError: if a marker is missing.
+        UserError: if a page lacks the marker of one of its tables.
     """
+    tables = _tables(root / "results")
+    pages = {}
+    for name, shown in PAGES.items():
+        path = root / name
+        text = path.read_text(encoding="utf-8")
+        for table in shown:
+            if table in tables:
+                text = _with_table(text, table, tables[table], path)
+        pages[path] = text
+    return pages
+
+
+def _tables(results: Path) -> dict[str, str]:
+    """Tables of the shipped studies, by name, in Markdown."""
     # slow to import
     from evolution.pages.blocks import to_markdown
-    from evolution.reproduce.reproduction import runs_table
+    from evolution.reproduce.reproduction import medians_table, runs_table
     from evolution.study.data import load_study
 
-    tables = {
-        path.name: to_markdown([runs_table(load_study(path))])
-        for path in shipped(results)
-    }
+    tables = {}
+    for path in shipped(results):
+        study = load_study(path)
+        tables[path.name] = to_markdown([runs_table(study)])
+        if path.name == REPORTED[0]:
+            tables["medians"] = to_markdown([medians_table(study, WHEELED_ROBOT)])
     gap = results / "gap" / "summary.md"
     if gap.exists():
         tables["gap"] = gap.read_text(encoding="utf-8")
-    for name, table in tables.items():
-        begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
-        before, found, rest = text.partition(begin)
-        _, closed, after = rest.partition(end)
-        if not (found and closed):
-            raise UserError(f"expected '{begin.strip()}' and '{end}' in the README")
-        text = before + begin + table + end + after
-    return text
+    return tables
+
+
+def _with_table(text: str, name: str, table: str, path: Path) -> str:
+    """The text of a page with one table replaced."""
+    begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
+    before, found, rest = text.partition(begin)
+    _, closed, after = rest.partition(end)
+    if not (found and closed):
+        raise UserError(f"expected '{begin.strip()}' and '{end}' in '{path}'")
+    return before + begin + table + end + after
 
 
 if __name__ == "__main__":

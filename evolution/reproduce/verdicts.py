@@ -1,9 +1,9 @@
-"""Verdicts on claims: what runs have to show before they speak for or against one.
+"""Verdicts on claims: what runs have to show for or against one.
 
 As in the report, fewer than 10 runs of an algorithm give none. An order needs
-a Mann-Whitney p below 0.05, adjusted for the pairs of its kind; a statement about
-every run a Wilson interval on one side of one half; the best of a few runs of somebody
-else has to have a rank among ours that is not too extreme.
+a Mann-Whitney p below 0.05, adjusted for the pairs of its kind. A statement about every
+run needs a Wilson interval on one side of one half. The best of the paper's few runs
+needs a rank among ours that is not too extreme.
 """
 
 from math import comb, floor
@@ -25,7 +25,7 @@ OTHER_STUDY = "can't be tested: another study"
 
 
 def of_order(pair: Comparison) -> str:
-    """Whether the first experiment of a pair exceeds the second."""
+    """Verdict on whether the first experiment of a pair exceeds the second."""
     if not pair.enough:
         return TOO_FEW
     if not pair.decided:
@@ -34,7 +34,7 @@ def of_order(pair: Comparison) -> str:
 
 
 def of_most(holds: np.ndarray) -> tuple[str, str]:
-    """In how many runs `(n,)` something holds, and whether that is most there are."""
+    """Verdict on whether something holds in most runs `(n,)`."""
     share = wilson(int(holds.sum()), holds.size)
     ours = f"{holds.sum()} of {holds.size} runs [{share.low:.0%}, {share.high:.0%}]"
     if holds.size < FEWEST_FOR_STARS:
@@ -45,7 +45,7 @@ def of_most(holds: np.ndarray) -> tuple[str, str]:
 
 
 def of_best(sample: np.ndarray, best: float, replicates: int) -> tuple[str, str]:
-    """Whether the best of so many runs of somebody else may be one of such as ours.
+    """Verdict on whether the best of other runs can come from runs like ours.
 
     That it may is all that runs can say. Above all of ours it may be luck for long: of
     three more runs the best is so with a probability of 3 / (n + 3).
@@ -69,14 +69,14 @@ def of_best(sample: np.ndarray, best: float, replicates: int) -> tuple[str, str]
 
 
 def chance_of_best(sample: np.ndarray, best: float, replicates: int) -> float:
-    """Probability, two-sided, that the best of more runs is as extreme among ours.
+    """Two-sided probability that the best of other runs ranks as extreme among ours.
 
     If all runs are alike, theirs and ours are in any order with the same probability.
     """
     above, n = int((sample > best).sum()), sample.size
 
     def at_least(k: int) -> float:
-        """That `k` or more of ours exceed all of theirs: that they lead the order."""
+        """Probability that `k` or more of our runs exceed all other runs."""
         return comb(n + replicates - k, replicates) / comb(n + replicates, replicates)
 
     at_most = 1 - at_least(above + 1) if above < n else 1.0
@@ -84,6 +84,6 @@ def chance_of_best(sample: np.ndarray, best: float, replicates: int) -> float:
 
 
 def fewest_to_contradict(replicates: int) -> int:
-    """Runs of ours below which no maximum, however high, is too extreme."""
+    """Number of our runs below which no maximum can be too high."""
     # 2 replicates / (n + replicates) below the level
     return floor(2 * replicates / LEVELS[0] - replicates) + 1

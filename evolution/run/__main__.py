@@ -34,24 +34,24 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Options:
-    """Evolve a controller for the e-puck and test its champion on fresh starts.
+    """Evolve a controller for the e-puck and test its champion on new starts.
 
     Attributes:
         experiment: a shipped experiment (de-best, de-rand, ga, random-search,
             one-plus-one-es, cma-es, de-best-calibrated, de-best-randomised,
-            ga-randomised) or a YAML file; it comes first.
-        config: the experiment's keys; a flag wins over the YAML.
-        optimizer: an optimiser of your own, my.py:Class, in place of the experiment's.
-        output: run directory, runs/<experiment>-seed-<seed> if not given.
-        resume: run directory to go on with.
+            ga-randomised) or a YAML file; must be the first argument.
+        config: the experiment's keys; a flag overrides the YAML file.
+        optimizer: an optimiser of your own, my.py:Class, instead of the experiment's.
+        output: run directory; runs/<experiment>-seed-<seed> if not given.
+        resume: run directory of the run to continue.
         threads: threads that step the robots; 0 is one per core. Changes no result.
-        engine: batch steps all robots at once, dm_control one trial after the other.
+        engine: batch steps all robots at once; dm_control runs one trial after the
+            other. Changes no result.
+        racing: --no-racing also simulates individuals that cannot win any more, which
+            are stopped otherwise. Changes no result.
+        live: show curves and the best individual in a rerun viewer that is running.
             Changes no result.
-        racing: --no-racing goes on with individuals that can only lose, which are
-            broken off otherwise. Changes no result.
-        live: show curves and the best individual in the rerun viewer that is running.
-            Changes no result.
-        print_config: print the resolved YAML and run nothing.
+        print_config: print the complete configuration as YAML and exit.
     """
 
     experiment: tyro.conf.Positional[Annotated[str, word("EXPERIMENT")]]
@@ -106,8 +106,9 @@ def evolve(argv: Sequence[str]) -> int:
             differing = run.resume()
             if differing:
                 print(
-                    f"warning: {', '.join(differing)} differ from where this run began "
-                    f"(see {directory.provenance}): its last bits may, too",
+                    f"warning: {', '.join(differing)} differ from those at the start "
+                    f"of this run (see {directory.provenance}); the last bits of its "
+                    "results may differ, too",
                     file=sys.stderr,
                 )
         else:
@@ -116,7 +117,7 @@ def evolve(argv: Sequence[str]) -> int:
 
 
 def _options(argv: Sequence[str]) -> Options:
-    """The options, on top of the experiment or of the run to be resumed."""
+    """The options, with defaults from the experiment or the run to be resumed."""
     first = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
     first.add_argument("--resume", type=Path, nargs="?")
     first.add_argument("--optimizer", nargs="?")
@@ -138,7 +139,7 @@ def _options(argv: Sequence[str]) -> Options:
     )
     if options.experiment != experiment:
         first = shell_command(MODULE, options.experiment, "...")
-        raise UserError(f"the experiment comes first: {first}")
+        raise UserError(f"expected the experiment as the first argument: {first}")
     # a run can be resumed from anywhere
     options = replace(options, config=options.config.located())
     if options.resume is not None and options.output is not None:
@@ -147,7 +148,7 @@ def _options(argv: Sequence[str]) -> Options:
 
 
 def _kind(config: ExperimentConfig) -> type[Options]:
-    """Options whose flags are the keys of that config, a user's optimiser's as well."""
+    """The class of options with a flag for each key of a config."""
     if type(config) is ExperimentConfig:
         return Options
     keys = [("config", type(config))]
@@ -166,8 +167,8 @@ def _carry_out(run: "Run", live: bool) -> int:
                 scores = _finished(run, live)
         except Interrupted:
             print(
-                f"Interrupted after {directory.evaluations():,} evaluations; go on "
-                f"with: {shell_command(MODULE, '--resume', directory.path)}",
+                f"Interrupted after {directory.evaluations():,} evaluations; "
+                f"continue with: {shell_command(MODULE, '--resume', directory.path)}",
                 file=sys.stderr,
             )
             return interruption.status
@@ -184,7 +185,7 @@ def _carry_out(run: "Run", live: bool) -> int:
 
 
 def _finished(run: "Run", live: bool) -> Scores:
-    """Scores of the champion, once evolved and chosen."""
+    """Evolve, choose the champion, and give its scores."""
     from evolution.run.live import Live
     from evolution.run.progress import Progress
 

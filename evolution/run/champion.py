@@ -1,4 +1,4 @@
-"""Champion: the best of a run by fresh starts, not by what the run believes.
+"""Champion: the best individual of a run on held-out starts.
 
 An optimiser that never re-evaluates keeps its luckiest draws. So the candidates are
 compared on validation starts and the winner is reported on test starts; both sets are
@@ -18,15 +18,15 @@ from evolution.run.generation_loop import Evolution
 from evolution.settings.randomness import Purpose
 
 BEST_OF_POPULATION = 0.1
-"""Share of the final population that are candidates."""
+"""Share of the final population whose members are candidates."""
 
 LATEST_BEST = 20
-"""Latest entries of the run's best-so-far list that are candidates."""
+"""Number of the latest best-so-far individuals that are candidates."""
 
 
 @dataclass(frozen=True)
 class Champion:
-    """The winner of a run.
+    """The champion of a run.
 
     Attributes:
         genome: its weights, `(genes,)`.
@@ -40,7 +40,7 @@ class Champion:
 
 
 def candidates(evolution: Evolution) -> tuple[np.ndarray, np.ndarray]:
-    """Genomes `(n, genes)` that may be champion and their stored fitness `(n,)`."""
+    """Genomes `(n, genes)` of the candidates and their stored fitness `(n,)`."""
     population, fitness = evolution.optimizer.population, evolution.optimizer.fitness
     n_best = max(1, round(BEST_OF_POPULATION * len(population)))
     order = np.argsort(-fitness, kind="stable")[:n_best]
@@ -59,7 +59,7 @@ def candidates(evolution: Evolution) -> tuple[np.ndarray, np.ndarray]:
 
 
 def most_believed(evolution: Evolution) -> tuple[np.ndarray, float]:
-    """The genome `(genes,)` with the highest stored fitness of the run, and that.
+    """The genome `(genes,)` with the highest stored fitness, and that fitness.
 
     What a run without held-out starts would show as its best.
     """

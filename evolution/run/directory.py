@@ -1,4 +1,4 @@
-"""The run directory: what a run leaves behind, and what it can be resumed from."""
+"""The run directory: the files of a run, from which it can be resumed."""
 
 import csv
 from collections.abc import Iterator, Sequence
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from evolution.run.generation_loop import Evolution
 
 LOCK = ".lock"
-"""File that the process which works in a directory holds."""
+"""File that is locked by the process that works in a directory."""
 
 
 @contextmanager
 def locked(directory: Path, patience: float = 0.0) -> Iterator[None]:
-    """Keep every other process out of a directory for the time of the block.
+    """Lock a directory against other processes for the block.
 
     Args:
         directory: made if it is not there.
@@ -56,10 +56,10 @@ def locked(directory: Path, patience: float = 0.0) -> Iterator[None]:
 
 
 class RunDirectory:
-    """One run's files; the checkpoint decides, everything else follows from it."""
+    """Files of a run; all others can be derived from the checkpoint."""
 
     def __init__(self, path: Path):
-        """Name the directory; nothing is touched yet."""
+        """Name the directory, without touching it."""
         self.path = path
         self.config = path / "config.yaml"
         self.provenance = path / "provenance.json"
@@ -78,7 +78,7 @@ class RunDirectory:
         return locked(self.path, patience)
 
     def refuse_if_used(self) -> None:
-        """Refuse a directory that holds anything.
+        """Refuse a directory that is not empty.
 
         Raises:
             UserError: if it does, or is not a directory.
@@ -94,11 +94,11 @@ class RunDirectory:
         if used:
             raise UserError(
                 f"output '{self.path}' is not empty: expected a new directory, or "
-                f"--resume {self.path} to go on with what is there"
+                f"--resume {self.path} to continue the run in it"
             )
 
     def create(self, config: ExperimentConfig, provenance: dict) -> None:
-        """Make the directory and write down what is about to happen.
+        """Make the directory and write config and provenance.
 
         Raises:
             UserError: if it cannot be written.
@@ -111,7 +111,7 @@ class RunDirectory:
             files.write_text(self.provenance, to_json(provenance))
 
     def stored_config(self) -> ExperimentConfig:
-        """The config of the run that is there.
+        """The config of the run in the directory.
 
         Raises:
             UserError: if there is none.
@@ -121,7 +121,7 @@ class RunDirectory:
         return load_config(self.config)
 
     def refuse_other_config(self, config: ExperimentConfig) -> None:
-        """Refuse to go on with a changed config.
+        """Refuse to resume with a changed config.
 
         Raises:
             UserError: naming the keys that differ.
@@ -134,7 +134,7 @@ class RunDirectory:
             )
 
     def restore(self, evolution: "Evolution", provenance: dict) -> list[str]:
-        """Put the evolution where the checkpoint is; at its start if there is none.
+        """Restore the evolution from the checkpoint, if there is one.
 
         Returns:
             What differs from where the run began and may change its last bits.
@@ -182,7 +182,7 @@ class RunDirectory:
                 )
 
     def save(self, evolution: "Evolution", seconds: Sequence[float]) -> None:
-        """Checkpoint, then what can be derived from it.
+        """Write the checkpoint, then the files derived from it.
 
         Args:
             evolution: to save.
@@ -204,7 +204,7 @@ class RunDirectory:
             ) from None
 
     def _write_derived(self, evolution: "Evolution", seconds: Sequence[float]) -> None:
-        """What the checkpoint holds as well, for those who only read."""
+        """Write the files that are derived from the checkpoint."""
         files.write_text(self.history, evolution.history())
         if evolution.records:
             best = {
@@ -215,7 +215,7 @@ class RunDirectory:
             files.write_text(self.timing, self._timing(evolution, seconds))
 
     def _timing(self, evolution: "Evolution", seconds: Sequence[float]) -> str:
-        """Text of timing.csv; no seconds where a kill took them."""
+        """Text of timing.csv; seconds are empty where a kill lost them."""
         taken: dict[int, str] = {}
         if files.is_file(self.timing):
             text = self.timing.read_text(encoding="utf-8", errors="replace")
@@ -244,22 +244,22 @@ class RunDirectory:
         return bool(self.provenance_fields().get("finished"))
 
     def mark_finished(self) -> None:
-        """Write down when everything was there."""
+        """Write the time at which the run was finished."""
         fields = self.provenance_fields() | {"finished": now()}
         with files.writing():
             files.write_text(self.provenance, to_json(fields))
 
     def contents(self) -> str:
-        """Names of the files, for a person."""
+        """Names of the files, separated by commas."""
         return ", ".join(self._names())
 
     def _names(self) -> list[str]:
-        """What is there, but for what a killed writer left behind."""
+        """Names of the files, without temporary files of killed writers."""
         aside = {*files.leftovers(self.path), self.path / LOCK}
         return sorted(p.name for p in self.path.iterdir() if p not in aside)
 
     def provenance_fields(self) -> dict:
-        """What is known of the run's beginning; empty if it was killed before.
+        """Provenance of the run; empty if it was killed before writing it.
 
         Raises:
             UserError: if it is damaged.

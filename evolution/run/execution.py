@@ -1,7 +1,7 @@
-"""Carrying a run out: evolve, save on the way, choose and test the champion.
+"""Execution of a run: evolve, save on the way, choose and test the champion.
 
-What a person's single run and a run of a study have in common. However it is carried
-out, and however often it is interrupted, the same config leaves the same bytes.
+Single runs and runs of a study use the same code. The same config gives the same bytes,
+with any threads and engine, and after any number of interruptions.
 """
 
 import time
@@ -18,7 +18,7 @@ from evolution.run.results import Stage, silent, write_results
 from evolution.settings.config import ExperimentConfig
 
 SAVING_SHARE = 0.05
-"""Most of the time that goes into checkpoints, where generations are short."""
+"""Largest share of time for checkpoints, where generations are short."""
 
 
 class Run:
@@ -31,7 +31,7 @@ class Run:
         means: Means,
         argv: Sequence[str],
     ):
-        """Load everything the run needs to its very end; nothing is written yet.
+        """Load everything that the run needs, without writing anything.
 
         Args:
             config: what to do.
@@ -63,7 +63,7 @@ class Run:
         self.directory.create(self.evolution.config, self._provenance)
 
     def resume(self) -> list[str]:
-        """Go on with what the directory holds.
+        """Continue from the checkpoint in the directory.
 
         Returns:
             What differs from where the run began and may change its last bits.
@@ -74,7 +74,7 @@ class Run:
         return self.directory.restore(self.evolution, self._provenance)
 
     def evolve(self) -> Iterator[Record]:
-        """Go through the generations that are left, saving on the way."""
+        """Run the remaining generations, saving on the way."""
         before, cost = time.monotonic(), 0.0
         seconds: list[float] = []
         for record in self.evolution.run():
@@ -88,7 +88,7 @@ class Run:
             yield record
 
     def finish(self, stage: Stage = silent) -> Scores:
-        """Scores of the champion: it is chosen, tested, and all written that shows it.
+        """Choose and test the champion and write all its files; its scores.
 
         Args:
             stage: told what is done next.

@@ -23,7 +23,7 @@ ENGINES = ("batch", "dm_control")
 
 @dataclass(frozen=True)
 class Record:
-    """One generation: what came of it, then what it cost.
+    """Record of one generation: fitness, then cost.
 
     Attributes:
         generation: counted from 0, the initial population.
@@ -99,7 +99,7 @@ class Evolution:
 
     @property
     def finished(self) -> bool:
-        """Whether the budget has no room for another generation."""
+        """Whether the budget has no evaluations left for another generation."""
         size = self.optimizer.next_size()
         return self.evaluations + size > self.config.evaluations
 
@@ -142,13 +142,13 @@ class Evolution:
         return record
 
     def _disturbances(self, generation: int) -> Disturbances | None:
-        """Of the trials of a generation, the same for every individual."""
+        """Disturbances of a generation's trials, the same for every individual."""
         config, key = self.config, (Purpose.STARTS, generation)
         n, steps, seed = config.trials, config.steps, config.seed
         return disturbances(config.conditions, n, steps, seed, *key)
 
     def state(self) -> dict[str, np.ndarray]:
-        """Everything that the next generations depend on, and what has been so far."""
+        """State from which evolution resumes, with the records so far."""
         optimizer = self.optimizer.state()
         return {
             "records": np.array([astuple(record) for record in self.records]),
@@ -157,7 +157,7 @@ class Evolution:
         }
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
-        """Go on from a `state`.
+        """Continue from a `state`.
 
         Raises:
             ValueError: if it does not belong to this run.
@@ -193,7 +193,7 @@ class Evolution:
         return array
 
     def history(self) -> str:
-        """Text of history.csv: no clock in it, floats that read back exactly."""
+        """Text of history.csv, without times, with floats that read back exactly."""
         rows = [
             ",".join(repr(getattr(record, name)) for name in HISTORY)
             for record in self.records
@@ -223,8 +223,8 @@ def make_engine(
     if name == "dm_control":
         if config.noise != "none":
             raise UserError(
-                f"engine dm_control knows ideal robots only, got noise {config.noise}: "
-                "expected engine batch"
+                f"engine dm_control supports ideal robots only, got noise "
+                f"{config.noise}; expected engine batch"
             )
         return DmControlEngine(scene, config.task)
     raise UserError(f"unknown engine '{name}'; available: {', '.join(ENGINES)}")

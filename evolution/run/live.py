@@ -1,7 +1,7 @@
 """Live view: a run in a rerun viewer, by a process of its own.
 
-Evolution hands over what it has and never waits: what a slow viewer has no time for is
-left out, and one that goes away takes nothing with it.
+Evolution hands its records over and never waits: generations for which a slow viewer
+has no time are left out, and a viewer that is closed does not stop the run.
 """
 
 import multiprocessing
@@ -38,20 +38,20 @@ BACKLOG = 10_000
 """Generations that may wait for the viewer."""
 
 PAUSE = 1.0
-"""Least time between two trials [s]: they are there to be looked at."""
+"""Least time between two trials [s], so that they can be watched."""
 
 PATIENCE = 5.0
 """How long the viewer's process may take to end [s]."""
 
 Generation = tuple[Record, np.ndarray]
-"""What came of a generation, and its best individual's genome."""
+"""Record of a generation, and its best individual's genome."""
 
 
 class Live:
-    """Shows an evolution while the context lasts."""
+    """Shows an evolution in a viewer for the block."""
 
     def __init__(self, evolution: Evolution):
-        """Name the evolution; nothing is shown yet."""
+        """Name the evolution, without showing it yet."""
         self._evolution = evolution
         self._shown = 0
         context = multiprocessing.get_context("spawn")
@@ -75,7 +75,7 @@ class Live:
             self._queue.put_nowait(generation)
 
     def __enter__(self) -> Self:
-        """Start, with what a resumed run has behind it."""
+        """Start, with the generations that a resumed run already has."""
         # Ctrl-C is the run's business
         with deaf_to_interrupts():
             self._process.start()
@@ -83,19 +83,19 @@ class Live:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Show what is left, if that does not take long."""
+        """Show the remaining generations, if that does not take long."""
         self._hand_over(None)
         self._process.join(PATIENCE)
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
-        # nobody is left to read it
+        # the viewer's process has ended
         self._queue.cancel_join_thread()
         self._queue.close()
 
 
 def require_viewer() -> None:
-    """Nothing, if there is a viewer.
+    """Refuse to start without a viewer that is running.
 
     Raises:
         UserError: if there is none.
@@ -108,7 +108,7 @@ def require_viewer() -> None:
 
 
 def viewer_there(port: int) -> bool:
-    """Whether somebody listens."""
+    """Whether a viewer listens."""
     try:
         with socket.create_connection((HOST, port), timeout=PAUSE):
             return True
@@ -117,11 +117,11 @@ def viewer_there(port: int) -> bool:
 
 
 def _show(config: ExperimentConfig, port: int, generations: Any) -> None:
-    """What the viewer's process does."""
+    """Main function of the viewer's process."""
     try:
         _follow(config, port, generations)
     except ConnectionError:
-        print("The viewer has gone; the run goes on", file=sys.stderr)
+        print("The viewer was closed; the run continues", file=sys.stderr)
     except Exception:
         traceback.print_exc()
     # rerun would wait for a viewer that has gone
@@ -132,7 +132,7 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
     """Show generations until the run has ended.
 
     Raises:
-        ConnectionError: if the viewer has gone, or takes nothing.
+        ConnectionError: if the viewer was closed, or accepts nothing.
     """
     # rerun is loaded by those who use it
     from epuck_mj.show.recording.live import LiveView
@@ -172,7 +172,7 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
 
 
 def _next(generations: Any) -> list[Generation | None]:
-    """All that waits, at least one; nothing if the run has died."""
+    """All waiting generations, at least one; none if the run's process has died."""
     batch: list[Generation | None] = []
     while not batch:
         try:
@@ -187,7 +187,7 @@ def _next(generations: Any) -> list[Generation | None]:
 
 
 def _add(view: Any, records: tuple[Record, ...]) -> None:
-    """The curves of some generations."""
+    """Add the curves of some generations."""
     view.generations(
         [record.evaluations for record in records],
         [record.generation for record in records],

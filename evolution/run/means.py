@@ -1,4 +1,4 @@
-"""Means: how a run is carried out, which changes none of its results."""
+"""Means: engine, threads and racing of a run, which change none of its results."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Means:
-    """How a run is carried out, which changes none of its results.
+    """Engine, threads and racing of a run, which change none of its results.
 
     Attributes:
         engine: one of `generation_loop.ENGINES`, or an engine whose `str` is what

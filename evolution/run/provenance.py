@@ -1,4 +1,4 @@
-"""Where a run came from: versions, code, models, machine, command and time."""
+"""Provenance of a run: versions, code, models, machine, command and time."""
 
 import json
 import platform
@@ -52,7 +52,7 @@ def now() -> str:
 
 
 def to_json(fields: Mapping[str, Any]) -> str:
-    """The file's text."""
+    """Text of the provenance file."""
     return json.dumps(fields, indent=1) + "\n"
 
 

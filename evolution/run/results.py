@@ -1,4 +1,4 @@
-"""What a finished run shows: its champion, judged by fresh starts, drawn and logged."""
+"""Results of a finished run: its champion, tested, drawn and recorded."""
 
 import itertools
 from collections.abc import Callable, Mapping

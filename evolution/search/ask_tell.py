@@ -1,4 +1,4 @@
-"""The rules of ask and tell that every optimiser shares: misuse, NaN, state.
+"""Ask and tell, the protocol of all optimisers: misuse, NaN, state.
 
 One generation is ``genomes = ask()``, an evaluation by the caller, ``tell(fitness)``.
 An optimiser remembers what it asked and refuses every other order of calls. Its state
@@ -37,7 +37,7 @@ def checked_fitness(fitness: ArrayLike, n_asked: int) -> np.ndarray:
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
-    """A copy that refuses to be written to."""
+    """A read-only copy."""
     copy = np.array(array)
     copy.flags.writeable = False
     return copy
@@ -49,7 +49,7 @@ def generator_state(rng: Generator) -> np.ndarray:
 
 
 def restored_generator(rng: Generator, text: np.ndarray) -> Generator:
-    """A new generator of the kind of `rng` that goes on where `text` was saved.
+    """A generator of the kind of `rng` that continues where `text` was saved.
 
     Args:
         rng: left as it is; only its kind of bit generator is used.
@@ -136,11 +136,11 @@ class Optimizer(ABC):
 
     @abstractmethod
     def propose(self) -> np.ndarray:
-        """Genomes of the next generation, of every one but the first, `(n, genes)`."""
+        """Genomes of the next generation `(n, genes)`; not called for the first."""
 
     @abstractmethod
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
-        """Make of the population and its fitness what they are after a generation.
+        """Update the population and its fitness with the fitness told.
 
         Args:
             asked: its genomes `(n, genes)`; the first population in generation 0.
@@ -148,11 +148,11 @@ class Optimizer(ABC):
         """
 
     def next_size(self) -> int:
-        """Number of genomes the next ask returns: what a generation costs."""
+        """Number of genomes that the next ask returns."""
         return len(self.population)
 
     def ask(self) -> np.ndarray:
-        """Genomes to evaluate `(next_size(), genes)`, the caller's to keep.
+        """Genomes to evaluate `(next_size(), genes)`, as a copy.
 
         Raises:
             AskTellError: the last genomes have not been told.
@@ -194,7 +194,7 @@ class Optimizer(ABC):
         return self.arrays()
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
-        """Go on where `state` was taken, with the very same random stream.
+        """Continue where `state` was taken, with the same random stream.
 
         Genomes asked but not told are forgotten. The optimiser must have been made with
         the parameters and the space of the one that was saved; of those, only what
@@ -211,7 +211,7 @@ class Optimizer(ABC):
         self._asked = None
 
     def load(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Take over the population, and what an algorithm adds to the state.
+        """Load the population, and the arrays that an algorithm adds to the state.
 
         The arrays have the shapes and types of `arrays`; whatever else can be wrong
         with them has to be found before anything is taken over.
@@ -220,7 +220,7 @@ class Optimizer(ABC):
         self.fitness = read_only(arrays["fitness"])
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The state."""
+        """Arrays of the state."""
         return {
             "name": np.array(self.name),
             "generation": np.array(self.generation),
@@ -240,7 +240,7 @@ class Optimizer(ABC):
         return self._asked
 
     def _refuse_pending(self, action: str) -> None:
-        """Nothing, unless genomes wait for their fitness.
+        """Refuse an action while genomes wait for their fitness.
 
         Raises:
             AskTellError: they do; says what cannot be done.

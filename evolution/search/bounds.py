@@ -1,6 +1,6 @@
-"""Bounds rules, for optimisers that leave the box: where a gene outside of it goes.
+"""Bounds rules: how genes outside the bounds are moved.
 
-The paper does not say. With CR = 1 and F = 0.8 it is a common case, so it matters.
+The paper does not say what happens to them. With CR = 1 and F = 0.8 they are common.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,14 +12,14 @@ from numpy.random import Generator
 def unbounded(
     trial: np.ndarray, parent: np.ndarray, lower: float, upper: float, rng: Generator
 ) -> np.ndarray:
-    """The trial as it is: the population may leave the bounds."""
+    """Leave the trial as it is: the population may leave the bounds."""
     return trial
 
 
 def midpoint(
     trial: np.ndarray, parent: np.ndarray, lower: float, upper: float, rng: Generator
 ) -> np.ndarray:
-    """Halfway between the parent and the violated bound."""
+    """Move genes halfway between the parent and the violated bound."""
     trial = np.where(trial < lower, (parent + lower) / 2, trial)
     return np.where(trial > upper, (parent + upper) / 2, trial)
 
@@ -27,14 +27,14 @@ def midpoint(
 def clip(
     trial: np.ndarray, parent: np.ndarray, lower: float, upper: float, rng: Generator
 ) -> np.ndarray:
-    """On the violated bound."""
+    """Move genes to the violated bound."""
     return np.clip(trial, lower, upper)
 
 
 def reflect(
     trial: np.ndarray, parent: np.ndarray, lower: float, upper: float, rng: Generator
 ) -> np.ndarray:
-    """Mirrored at the bounds as often as it takes to be inside."""
+    """Mirror genes at the bounds until they are inside."""
     # Repeated mirroring is a triangle wave of period 2 * width.
     width = upper - lower
     mirrored = lower + width - np.abs(np.mod(trial - lower, 2 * width) - width)
@@ -46,7 +46,7 @@ def reflect(
 def reinit(
     trial: np.ndarray, parent: np.ndarray, lower: float, upper: float, rng: Generator
 ) -> np.ndarray:
-    """Anywhere inside, uniformly."""
+    """Draw genes anew, uniformly inside the bounds."""
     fresh = rng.uniform(lower, upper, size=trial.shape)
     return np.where((trial < lower) | (trial > upper), fresh, trial)
 
@@ -63,7 +63,7 @@ BOUNDS_RULES: Mapping[str, BoundsRule] = {
 
 
 def check_bounds_rule(name: str) -> None:
-    """Nothing, if there is a rule of that name.
+    """Refuse the name of an unknown rule.
 
     Raises:
         ValueError: there is none.

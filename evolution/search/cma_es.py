@@ -1,8 +1,9 @@
 """CMA-ES with restarts, maximising: the package `cmaes` behind ask and tell.
 
-Each start is a `cmaes.CMA` at a random mean in the initial range. When it has nothing
-left to find, or only noise, the next generation starts another one with twice the
-population. `cmaes` sees the former; the latter is `has_stagnated`. A genome
+Each search is a `cmaes.CMA` that starts at a random mean in the initial range. When it
+has converged, which `cmaes` detects, or when it only follows noise, which
+`has_stagnated` detects, the next generation starts another one with twice the
+population. A genome
 outside the bounds is drawn again up to 100 times, then clipped, by `cmaes`.
 
 A `cmaes.CMA` cannot be saved without pickle or its private attributes. But it is a
@@ -54,14 +55,14 @@ def made_finite(fitness: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class CmaEsParameters:
-    """What a CMA-ES is made of.
+    """Parameters of a CMA-ES.
 
     Attributes:
         population: individuals of a generation (lambda), at least 4; doubled by each
             restart. The tutorial's default for 40 genes is 15.
         sigma: first step size of each start, above 0, at most the width of the bounds.
-        restarts: start again when there is no more progress; otherwise go on.
-        algorithm: what it is, for configurations.
+        restarts: start again when there is no more progress; otherwise continue.
+        algorithm: the algorithm's name in configurations.
 
     Raises:
         ValueError: a value out of its range.
@@ -114,7 +115,7 @@ class CmaEs(Optimizer):
         return self._cma.population_size
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
-        """Make the generation asked the current one; start again if it is time."""
+        """Make the generation asked the current one; restart if it is stuck."""
         # it minimises
         costs = (-made_finite(told)).tolist()
         self._cma.tell(list(zip(asked, costs, strict=True)))
@@ -161,7 +162,7 @@ class CmaEs(Optimizer):
         }
 
     def _should_stop(self) -> bool:
-        """Whether the present start has nothing left to find, or only noise."""
+        """Whether the present search makes no more progress, or only by noise."""
         window = stagnation_window(
             len(self._history), self._space.genes, self._cma.population_size
         )
@@ -170,7 +171,7 @@ class CmaEs(Optimizer):
         return self._cma.should_stop() or has_stagnated(recent, window)
 
     def _started(self, population: int) -> "CMA":
-        """A new search of that population at a random mean, without a history."""
+        """A new search with this population at a random mean."""
         # with scipy behind it: for those who use it
         from cmaes import CMA
 
@@ -192,7 +193,7 @@ class CmaEs(Optimizer):
 
 
 def stagnation_window(generations: int, genes: int, population: int) -> int:
-    """How many of its last generations a start is judged by: a fifth, at least 120.
+    """Number of last generations that are checked for progress: a fifth, at least 120.
 
     Args:
         generations: how many there were since the start.

@@ -81,18 +81,19 @@ def binomial_crossover(
 
 @dataclass(frozen=True)
 class DifferentialEvolutionParameters:
-    """What a differential evolution is made of.
+    """Parameters of differential evolution.
 
     Attributes:
-        strategy: best or rand: which individual is the base of a mutant.
+        strategy: base of a mutant: best (the best individual) or rand (a random one).
         population: number of individuals N, at least 4.
         scale: F in [0, 2], the differential weight.
         crossover: CR in [0, 1], the probability that a gene comes from the mutant.
-        bounds_rule: midpoint, none, clip, reflect or reinit: where a gene outside the
-            bounds goes.
-        reevaluate_parents: ask parents and trials together from the second generation
-            on, and compare and store fresh fitness only. A generation then costs 2 N.
-        algorithm: what it is, for configurations.
+        bounds_rule: how a gene outside the bounds is moved: midpoint, none, clip,
+            reflect or reinit.
+        reevaluate_parents: from the second generation on, evaluate parents and trial
+            vectors together, and compare and store their new fitness only. A generation
+            then costs 2 N evaluations.
+        algorithm: the algorithm's name in configurations.
 
     Raises:
         ValueError: a value out of its range or an unknown name.

@@ -1,6 +1,6 @@
 """(1+1) evolution strategies with the one-fifth success rule, maximising.
 
-Several run side by side and never meet: each lineage is one parent with its own step
+Several run independently side by side: each lineage is one parent with its own step
 size sigma. In every generation it gets one offspring, the parent plus sigma times a
 standard normal vector, and is replaced iff that is strictly fitter. A tie keeps the
 parent and counts as a failure. Randomness is drawn in this order: the initial
@@ -26,10 +26,10 @@ from evolution.search.bounds import BOUNDS_RULES, check_bounds_rule
 from evolution.search.search_space import SearchSpace, refuse_wide_steps
 
 ALPHA = np.exp(1 / 3)
-"""What a success multiplies sigma with; four failures undo it."""
+"""Factor of sigma after a success, which four failures undo."""
 
 SIGMA_MIN = 1e-12
-"""Smallest sigma, as a share of the width of the bounds: the rule alone has none."""
+"""Smallest sigma, as a share of the width of the bounds."""
 
 
 def one_fifth_rule(
@@ -50,14 +50,14 @@ def one_fifth_rule(
 
 @dataclass(frozen=True)
 class EvolutionStrategyParameters:
-    """What (1+1) evolution strategies are made of.
+    """Parameters of (1+1) evolution strategies.
 
     Attributes:
         lineages: number of strategies side by side, at least 1: the population.
         sigma: first step size of each, above 0, at most the width of the bounds.
-        bounds_rule: midpoint, none, clip, reflect or reinit: where a gene outside the
-            bounds goes.
-        algorithm: what it is, for configurations.
+        bounds_rule: how a gene outside the bounds is moved: midpoint, none, clip,
+            reflect or reinit.
+        algorithm: the algorithm's name in configurations.
 
     Raises:
         ValueError: a value out of its range or an unknown name.

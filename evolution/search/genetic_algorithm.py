@@ -91,17 +91,17 @@ def mutate(chromosomes: np.ndarray, probability: float, rng: Generator) -> np.nd
 
 @dataclass(frozen=True)
 class GeneticAlgorithmParameters:
-    """What a genetic algorithm is made of.
+    """Parameters of a genetic algorithm.
 
     Attributes:
         population: number of individuals, at least 2; may be odd.
-        bits: per gene, 1 to 32.
-        tournament: contestants in each tournament.
+        bits: bits per gene, 1 to 32.
+        tournament: number of individuals in each tournament.
         crossover: probability in [0, 1] that a pair of parents is crossed.
         mutation: probability in [0, 1] that a bit is flipped.
-        elites: the best of a generation that enter the next unchanged. They are asked
-            again and so re-evaluated: an elite can lose its place by bad luck.
-        algorithm: what it is, for configurations.
+        elites: number of best individuals that enter the next generation unchanged.
+            They are evaluated again, so an elite can lose its place by bad luck.
+        algorithm: the algorithm's name in configurations.
 
     Raises:
         ValueError: a value out of its range.

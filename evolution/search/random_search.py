@@ -1,4 +1,4 @@
-"""Random search, maximising: the baseline that learns nothing.
+"""Random search, maximising: a baseline.
 
 Every generation is drawn uniformly in the initial range, whatever has been told; the
 best individuals seen so far are kept. Randomness is drawn in this order: each
@@ -16,7 +16,7 @@ from evolution.search.search_space import SearchSpace
 
 
 def best_of(fitness: np.ndarray, n: int) -> np.ndarray:
-    """Indices `(n,)`, ascending, of the `n` highest; of equals the first are taken.
+    """Indices `(n,)`, ascending, of the `n` highest values, the first among equals.
 
     Args:
         fitness: `(at least n,)`.
@@ -28,11 +28,11 @@ def best_of(fitness: np.ndarray, n: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class RandomSearchParameters:
-    """What a random search is made of.
+    """Parameters of a random search.
 
     Attributes:
         population: genomes of a generation, and individuals kept, at least 1.
-        algorithm: what it is, for configurations.
+        algorithm: the algorithm's name in configurations.
 
     Raises:
         ValueError: a value out of its range.
@@ -71,11 +71,11 @@ class RandomSearch(Optimizer):
         return np.full(len(self.pending()), self.fitness.min())
 
     def propose(self) -> np.ndarray:
-        """Fresh genomes `(population, genes)`."""
+        """New random genomes `(population, genes)`."""
         return self._drawn(self.rng)
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
-        """Keep the best of those kept and those asked; of equals the older."""
+        """Keep the best individuals of those kept and asked, the older of equals."""
         if self.generation == 0:
             self.fitness = read_only(told)
             return

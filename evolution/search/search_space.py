@@ -1,4 +1,4 @@
-"""Where an optimiser searches."""
+"""Search space: bounds and initial range of genomes."""
 
 from dataclasses import dataclass
 
@@ -42,7 +42,7 @@ class SearchSpace:
 
 
 def refuse_wide_steps(sigma: float, space: SearchSpace) -> None:
-    """Nothing, unless steps are wider than the bounds.
+    """Refuse steps that are wider than the bounds.
 
     Raises:
         ValueError: `sigma` exceeds their width.

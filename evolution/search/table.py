@@ -1,8 +1,8 @@
-"""The table of the optimisers: those that are shipped, and a user's own.
+"""Table of optimisers: shipped ones and a user's own.
 
-The modules behind it do not know this one: `ask_tell` has what they share,
-`search_space` the box, one module each the algorithms. The baselines beside the paper's
-are random search, (1+1)-ES and CMA-ES.
+Only this module imports all algorithms, which are one module each. They share
+`ask_tell` and `search_space`. The baselines beside the paper's are random search,
+(1+1)-ES and CMA-ES.
 
     optimizer = make_optimizer(config.optimizer, config.search_space, rng)
     while spent + optimizer.next_size() <= budget:
@@ -68,7 +68,7 @@ MAKERS: Mapping[type[OptimizerParameters], Maker] = {
 ALGORITHMS: Mapping[str, type[OptimizerParameters]] = {
     kind.algorithm: kind for kind in MAKERS
 }
-"""The kinds of parameters by what configurations call their `algorithm`."""
+"""Classes of parameters by the name of their `algorithm`."""
 
 
 def parameters_kind(algorithm: str) -> type:
@@ -89,7 +89,7 @@ def parameters_kind(algorithm: str) -> type:
 
 @cache
 def own_parameters(algorithm: str) -> type:
-    """The parameters of a user's subclass of `Optimizer`, and which one it is.
+    """The parameters class of a user's `Optimizer`, with its `algorithm`.
 
     They are a frozen dataclass, the attribute `Parameters` of that class, in which
     everything has a default.

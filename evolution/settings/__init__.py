@@ -1,1 +1,1 @@
-"""What an experiment is: its config, its files, its randomness."""
+"""Settings of experiments: config, files and randomness."""

@@ -1,4 +1,4 @@
-"""In what configurations differ."""
+"""Comparison of configurations."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,7 +7,7 @@ from evolution.settings.config import ExperimentConfig
 
 
 def differing_keys(stored: ExperimentConfig, asked: ExperimentConfig) -> list[str]:
-    """What two configs disagree about, a text for each key."""
+    """Keys in which two configs differ, with both values, a text each."""
     return [
         f"{key} (stored {values.get('stored')}, got {values.get('asked')})"
         for key, values in differences({"stored": stored, "asked": asked}).items()

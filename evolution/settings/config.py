@@ -1,4 +1,4 @@
-"""What an experiment is: typed, frozen, read from YAML, unknown keys refused."""
+"""Configuration of an experiment: typed, frozen, read from YAML."""
 
 from functools import cache
 from typing import Annotated, Any, Self
@@ -42,29 +42,36 @@ from evolution.settings.setting import Setting
 
 
 class ExperimentConfig(BaseModel):
-    """One run of evolution, but for how it is carried out (threads, engine, output)."""
+    """Configuration of one run of evolution, without threads, engine and output."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     seed: StrictInt = Field(1, ge=0, description="seed of everything random")
     evaluations: StrictInt = Field(
-        30_000, ge=1, description="budget: individuals evaluated, whole generations"
+        30_000,
+        ge=1,
+        description="number of individuals to evaluate, rounded down to whole "
+        "generations",
     )
     robot: Annotated[str, word("ROBOT")] = Field(
-        "epuck_planar", description="epuck_planar, epuck (wheels) or an MJCF file"
+        "epuck_planar",
+        description="epuck_planar (slides on a plane), epuck (drives on wheels) or the "
+        "path of an MJCF file",
     )
     arena: Annotated[str, word("ARENA")] = Field(
-        "arena", description="name of a shipped arena or an MJCF file"
+        "arena", description="name of a shipped arena or the path of an MJCF file"
     )
-    trials: StrictInt = Field(5, ge=1, description="trials of an individual")
+    trials: StrictInt = Field(5, ge=1, description="trials per individual")
     steps: StrictInt = Field(
-        300, ge=1, le=STEPS_MAX, description="control steps of a trial"
+        300, ge=1, le=STEPS_MAX, description="control steps per trial"
     )
-    control_step: StrictFloat = Field(0.1, gt=0, description="control step [s]")
+    control_step: StrictFloat = Field(
+        0.1, gt=0, description="duration of a control step [s]"
+    )
     fitness: FitnessName = Field(
         "product",
-        description="step fitness: product, the paper's prose; literal, its equation "
-        "(2); or my.py:name, a function of your own",
+        description="step fitness: product (as the paper describes it), literal (the "
+        "paper's equation 2) or my.py:name (a function of your own)",
     )
     v_max: StrictFloat = Field(
         SPEED_MAX, gt=0, description="forward speed at v = 1 [m/s]"
@@ -76,15 +83,17 @@ class ExperimentConfig(BaseModel):
         PROXIMITY_RANGE, gt=0, description="range of the proximity sensors [m]"
     )
     noise: NoiseLevel = Field(
-        "none", description="none: ideal sensors and motors; others: as real ones"
+        "none",
+        description="sensors and motors: none (ideal), calibrated (with the noise "
+        "measured on real robots) or strong (with more noise)",
     )
     randomise: StrictBool = Field(
-        False, description="another robot in each trial; needs noise"
+        False, description="give each trial a different robot; needs noise"
     )
     calibration: CalibrationConfig = Field(
         None,
-        description="file of python -m epuck_mj.calibrate, or its keys: that robot "
-        "in all trials; needs noise",
+        description="file written by python -m epuck_mj.calibrate, or its keys: use "
+        "that robot in all trials; needs noise",
     )
     start_clearance: StrictFloat = Field(
         START_CLEARANCE,
@@ -94,47 +103,52 @@ class ExperimentConfig(BaseModel):
     )
     network: NetworkName = Field(
         FEEDFORWARD,
-        description="feedforward, the paper's with hidden neurons and biases as below; "
-        "or my.py:Class, a network of your own",
+        description="feedforward (the paper's, with the hidden neurons and biases "
+        "below) or my.py:Class (a network of your own)",
     )
-    hidden: StrictInt = Field(4, ge=1, description="hidden neurons")
+    hidden: StrictInt = Field(4, ge=1, description="number of hidden neurons")
     biases: StrictBool = Field(
         False, description="give hidden and output neurons a bias"
     )
     weight_bound: StrictFloat = Field(
-        5.0, gt=0, le=1e6, description="weights stay within +- this"
+        5.0, gt=0, le=1e6, description="weights stay within plus or minus this value"
     )
     weight_init: StrictFloat = Field(
-        5.0, gt=0, le=1e6, description="first weights are uniform within +- this"
+        5.0,
+        gt=0,
+        le=1e6,
+        description="initial weights are uniform within plus or minus this value",
     )
     validation_starts: StrictInt = Field(
         N_VALIDATION,
         ge=1,
         le=STARTS_MAX,
-        description="fresh starts on which the champion is chosen",
+        description="number of starts on which the champion is chosen; evolution does "
+        "not use them",
     )
     test_starts: StrictInt = Field(
         N_TEST,
         ge=2,
         le=STARTS_MAX,
-        description="other fresh starts on which the champion is tested",
+        description="number of other starts on which the champion is tested; evolution "
+        "does not use them",
     )
     optimizer: OptimizerConfig
 
     @model_validator(mode="after")
     def _of_robots_there_are(self) -> Self:
-        """Refuse conditions that exclude themselves."""
+        """Refuse conditions that exclude each other."""
         _ = self.conditions
         return self
 
     @property
     def conditions(self) -> Conditions:
-        """What the robots are like."""
+        """Noise, randomisation and calibration of the robots."""
         return Conditions(self.noise, self.randomise, self.calibration)
 
     @property
     def task(self) -> TaskParameters:
-        """What a trial is."""
+        """Length, fitness, sensors and speeds of a trial."""
         return TaskParameters(
             steps=self.steps,
             control_step=self.control_step,
@@ -145,17 +159,17 @@ class ExperimentConfig(BaseModel):
 
     @property
     def budget(self) -> int:
-        """Trials that evolution may cost."""
+        """Number of trials that evolution may use."""
         return self.evaluations * self.trials
 
     @property
     def setting(self) -> Setting:
-        """In what the trials are lived."""
+        """Arena, task and start clearance of the trials."""
         return Setting(self.arena, self.task, self.start_clearance)
 
     @property
     def topology(self) -> Topology:
-        """What genomes decode to."""
+        """Topology of the networks that genomes decode to."""
         if self.network == FEEDFORWARD:
             return Network(self.hidden, self.biases)
         return OwnNetwork(self.network)
@@ -172,7 +186,7 @@ class ExperimentConfig(BaseModel):
 
     @property
     def search_space(self) -> SearchSpace:
-        """Where genomes may be."""
+        """Bounds and initial range of genomes."""
         return SearchSpace(
             genes=self.topology.n_genes,
             lower=-self.weight_bound,
@@ -182,7 +196,7 @@ class ExperimentConfig(BaseModel):
         )
 
     def located(self) -> Self:
-        """The config with paths that mean the same from anywhere."""
+        """The config with absolute paths."""
         places = {
             "robot": absolute(self.robot),
             "arena": absolute(self.arena),
@@ -192,7 +206,7 @@ class ExperimentConfig(BaseModel):
         return self.model_copy(update=places)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """As text: a user's classes are those of a file, not of a module."""
+        """Pickle the config as text, because a user's classes belong to no module."""
         return ExperimentConfig.from_yaml, (self.to_yaml(), "config")
 
     def to_yaml(self) -> str:
@@ -201,19 +215,19 @@ class ExperimentConfig(BaseModel):
 
     @classmethod
     def from_yaml(cls, text: str, where: str) -> "ExperimentConfig":
-        """The config that `to_yaml` wrote; keys it did not know have their defaults.
+        """The config that `to_yaml` wrote; missing keys get their defaults.
 
         Raises:
-            UserError: beginning with `where`, if it is anything else.
+            UserError: beginning with `where`, if the text is not a config.
         """
         return cls.parsed(parse_yaml(text, where), where)
 
     @classmethod
     def parsed(cls, fields: Any, where: str) -> "ExperimentConfig":
-        """The config that keys and values make.
+        """The config with these keys and values.
 
         Raises:
-            UserError: beginning with `where`, if they make none.
+            UserError: beginning with `where`, if a key or a value is invalid.
         """
         kind, fields = _kind_for(fields)
         try:
@@ -225,7 +239,7 @@ class ExperimentConfig(BaseModel):
 
 
 def _kind_for(fields: Any) -> tuple[type[ExperimentConfig], Any]:
-    """The class for keys and values, and these with an algorithm found from anywhere.
+    """The config class for these fields, and the fields with an absolute path.
 
     Raises:
         UserError: if they name a user's optimiser that cannot be loaded.

@@ -1,4 +1,4 @@
-"""What is wrong with a configuration, in one line."""
+"""Errors of a configuration in one line."""
 
 from collections.abc import Sequence
 from dataclasses import fields
@@ -10,7 +10,7 @@ from evolution.search.table import ALGORITHMS
 
 
 def one_line(error: ValidationError, keys: Sequence[str], optimizer: type) -> str:
-    """Everything a config got wrong, with the keys there are when one is unknown.
+    """All errors of a config in one line, with the known keys if one is unknown.
 
     Args:
         error: of the config.
@@ -38,7 +38,7 @@ def one_line(error: ValidationError, keys: Sequence[str], optimizer: type) -> st
 def _keys(
     loc: tuple[int | str, ...], keys: Sequence[str], optimizer: type
 ) -> Sequence[str]:
-    """The keys that could stand where the unknown key at `loc` stands."""
+    """The known keys in the place of the unknown key at `loc`."""
     if len(loc) == 1:
         return keys
     return [field.name for field in fields(ALGORITHMS.get(str(loc[1]), optimizer))]

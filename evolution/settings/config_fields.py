@@ -14,19 +14,19 @@ from epuck_mj.step.fitness import FORMULAS
 from evolution.search.table import ALGORITHMS, OptimizerParameters
 
 N_VALIDATION = 200
-"""Starts on which a champion is chosen, where a configuration says nothing else."""
+"""Default number of starts on which a champion is chosen."""
 
 N_TEST = 1000
-"""Starts on which a champion is tested, where a configuration says nothing else."""
+"""Default number of starts on which a champion is tested."""
 
 STARTS_MAX = 100_000
 
 FEEDFORWARD = "feedforward"
-"""The paper's network, with hidden neurons and biases as a configuration says."""
+"""Name of the paper's network, with the configuration's hidden neurons and biases."""
 
 
 def _one_of(*shipped: str) -> AfterValidator:
-    """A name that is shipped, or that of an own part."""
+    """Validator of names: shipped ones, or those of own parts."""
 
     def known(name: str) -> str:
         if name in shipped or is_own(name):
@@ -42,7 +42,7 @@ NetworkName = Annotated[str, _one_of(FEEDFORWARD), word("NETWORK")]
 
 
 def _of_known_algorithm(value: Any) -> Any:
-    """`value`, which says whose parameters it holds.
+    """Refuse a `value` without a known algorithm.
 
     Raises:
         ValueError: if it does not.
@@ -68,7 +68,7 @@ OptimizerConfig = Annotated[
 
 
 def _calibration(value: Any) -> Any:
-    """A calibration in the config itself, which is how one of a file is kept.
+    """Calibration from keys in the config, or from a file, whose keys are kept.
 
     Raises:
         ValueError: if it is none.
@@ -84,7 +84,7 @@ def _calibration(value: Any) -> Any:
 
 
 def _calibration_flag(value: str) -> Calibration | None:
-    """The file that a flag names; `none` is the robot of the books."""
+    """Path that a flag names; `none` is the nominal robot."""
     return None if value == "none" else Calibration.load(Path(value))
 
 

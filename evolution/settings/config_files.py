@@ -1,4 +1,4 @@
-"""Experiments in YAML files: those that are shipped, and a person's own."""
+"""Experiments in YAML files: shipped ones and the user's own."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -22,7 +22,7 @@ def shipped_with(key: str) -> Mapping[str, Path]:
 
 
 def shipped_experiments() -> Mapping[str, Path]:
-    """Files of the shipped experiments by name; studies are kept beside them."""
+    """Files of the shipped experiments by name."""
     return shipped_with("optimizer")
 
 

@@ -1,4 +1,4 @@
-"""Randomness by what it is for: streams of one seed that never meet."""
+"""Randomness by purpose: independent streams of one seed."""
 
 from enum import IntEnum
 
@@ -9,7 +9,7 @@ from epuck_mj.step.disturbances import Disturbances
 
 
 class Purpose(IntEnum):
-    """What randomness is for: streams of one seed that never meet."""
+    """Purpose of a random stream; streams of different purposes are independent."""
 
     SEARCH = 0
     STARTS = 1
@@ -19,14 +19,14 @@ class Purpose(IntEnum):
 
 
 def random_generator(seed: int, *key: int) -> np.random.Generator:
-    """The stream of `seed` for a purpose and, behind it, whatever it depends on."""
+    """The random stream of a seed, a purpose and further numbers."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
 
 
 def disturbances(
     conditions: Conditions, n: int, steps: int, seed: int, *key: int
 ) -> Disturbances | None:
-    """What `n` trials meet, if anything.
+    """Disturbances of `n` trials; None for ideal robots.
 
     Args:
         conditions: what the robots are like.

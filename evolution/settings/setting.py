@@ -1,4 +1,4 @@
-"""Setting: in what trials are lived, by whatever robot."""
+"""Setting: arena, task and start clearance of trials."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from epuck_mj.step.control import TaskParameters
 
 @dataclass(frozen=True)
 class Setting:
-    """Fitness is worth the same where these are the same.
+    """Arena, task and start clearance: fitness is comparable where these are equal.
 
     Attributes:
         arena: name of a shipped arena, or path of its MJCF.

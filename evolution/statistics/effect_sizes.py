@@ -1,7 +1,7 @@
 """Effect sizes: by how much the runs of two algorithms differ.
 
-The unit is the run: samples are `(n,)` and `(m,)`, one value per run, finite and not
-empty, or there is a `ValueError`.
+The unit is the run: samples are `(n,)` and `(m,)`, one value per run. Empty
+samples and values that are not finite raise `ValueError`.
 """
 
 import math
@@ -18,7 +18,7 @@ from evolution.statistics.estimates import (
 )
 
 INSIDE = 1e-12
-"""Distance from 0 and 1 at which roots are sought: either is a root of its own."""
+"""Distance from 0 and 1 within which no roots are looked for."""
 
 
 def a12(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -53,7 +53,7 @@ def a12_interval(a: np.ndarray, b: np.ndarray) -> Interval:
     half = (a.size + b.size) / 2 - 1
 
     def excess(true: float) -> float:
-        """How much further `value` is off than chance puts it; positive if rejected."""
+        """Excess of a deviation over what chance allows; positive if rejected."""
         spread = 1 + half * ((1 - true) / (2 - true) + true / (1 + true))
         variance = true * (1 - true) * spread / (a.size * b.size)
         return abs(value - true) - z * math.sqrt(variance)

@@ -1,8 +1,8 @@
-"""Samples of runs described: means, shares and quartiles with their bounds.
+"""Estimates from samples of runs: means, shares and quartiles with bounds.
 
-The unit is the run: a sample is `(n,)`, one value per run, finite and not empty, or
-there is a `ValueError`. One run has a value but no spread, and few have none that could
-be trusted: their bounds are nan. The same generator gives the same bounds.
+The unit is the run: a sample is `(n,)`, one value per run. An empty sample and values
+that are not finite raise `ValueError`. The bounds of one run, and of too few runs for a
+reliable interval, are nan. The same generator gives the same bounds.
 """
 
 import math
@@ -13,22 +13,22 @@ from typing import Any
 import numpy as np
 
 FEWEST_FOR_INTERVAL = 5
-"""Runs of the smallest sample of which a comparison or a cost has an interval.
+"""Least number of runs for the interval of a comparison or a cost.
 
 Of 3, bounds said to hold the truth in 95 % hold it in 90; of 2, in 66.
 """
 
 FEWEST_FOR_RANKS = 5
-"""Pairs below which a rank correlation says nothing: of 4, any order is common."""
+"""Least number of pairs for a rank correlation: with 4, any order is common."""
 
 CONFIDENCE = 0.95
-"""Probability of all intervals to hold the true value: the 95 % of every text."""
+"""Probability with which intervals hold the true value."""
 
 RESAMPLES = 2000
-"""Resamples of each bootstrap."""
+"""Number of resamples of each bootstrap."""
 
 BATCH = 200
-"""Resamples in memory at once: small arrays stay in the cache."""
+"""Number of resamples in memory at once: small arrays stay in the cache."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Interval:
 
 
 def mean_interval(sample: np.ndarray, rng: np.random.Generator) -> Interval:
-    """Mean of `(n,)` with a BCa bootstrap; a constant sample has a mean without doubt.
+    """Mean of `(n,)` with a BCa bootstrap interval, of width 0 if all are equal.
 
     Source: Efron 1987, "Better bootstrap confidence intervals".
     """
@@ -123,7 +123,7 @@ def checked_sample(sample: np.ndarray) -> np.ndarray:
 
 
 def refuse_no_share(successes: int, n: int) -> None:
-    """Refuse numbers of successes that no trials can have.
+    """Refuse numbers of successes that are impossible.
 
     Raises:
         ValueError: if there are no trials or more successes than trials.

@@ -1,7 +1,7 @@
 """Significance: the Mann-Whitney test, Fisher's, and Holm's adjustment of a family.
 
-The unit is the run: samples are `(n,)` and `(m,)`, one value per run, finite and not
-empty, or there is a `ValueError`.
+The unit is the run: samples are `(n,)` and `(m,)`, one value per run. Empty
+samples and values that are not finite raise `ValueError`.
 """
 
 from dataclasses import dataclass
@@ -15,10 +15,10 @@ EXACT = 50
 """Largest sample of which the Mann-Whitney test is exact; takes milliseconds."""
 
 FEWEST_FOR_STARS = 10
-"""Runs of the smaller sample below which no stars are given."""
+"""Least size of the smaller sample for stars."""
 
 LEVELS = (0.05, 0.01, 0.001)
-"""Below each of these p earns one star more."""
+"""Values of p below which a test gets one star more."""
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ def evaluations_to_target(
 
 
 def expected_running_time(hits: np.ndarray, spent: np.ndarray) -> float:
-    """Evaluations per success, if whoever fails starts again; inf without a success.
+    """Evaluations per success if failed runs start again; inf without a success.
 
     What all runs spent before they hit, or in vain, by the number that hit.
 
@@ -105,7 +105,7 @@ def ecdf(hits: np.ndarray, budgets: np.ndarray) -> np.ndarray:
 
 
 def _cost(hits: np.ndarray, spent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Evaluations each run needed or wasted `(runs,)`, and whether it hit."""
+    """Evaluations that each run used `(runs,)`, and whether it reached the target."""
     hits, spent = np.asarray(hits, float), checked_sample(spent)
     if hits.shape != spent.shape:
         raise ValueError(

@@ -38,22 +38,26 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Options:
-    """Run every experiment of a study with every seed; what is done is skipped.
+    """Run every experiment of a study with every seed; skip finished runs.
 
-    Run s of each experiment gets the same starts. Call it again to go on after Ctrl-C,
-    a crash or a power cut, or to add seeds and experiments.
+    Runs of one seed get the same starts in every experiment. Call it again to continue
+    after Ctrl-C, a crash or a power cut, or to add seeds and experiments.
 
     Attributes:
         study: a shipped study (paper, wheels, transfer, quick) or a YAML file.
         output: study directory.
-        seeds: as 1-30 or 1,3,5-8.
-        experiments: only these of the study, separated by commas.
-        jobs: runs side by side; 0 is one per core. Cores left over become threads.
-        racing: --no-racing goes on with individuals that can only lose, which are
-            broken off otherwise. Changes no result.
-        cluster: Dask scheduler to send runs to, as tcp://host:8786, or local:4 for four
-            workers of its own. Needs the extra [cluster].
-        split: send the evaluations inside a run instead, one run at a time.
+        seeds: seeds of the runs, such as 1-30 or 1,3,5-8.
+        experiments: names of the experiments to run, separated by commas; all if not
+            given.
+        jobs: number of runs side by side; 0 is one per core. Remaining cores are used
+            as threads.
+        racing: --no-racing also simulates individuals that cannot win any more, which
+            are stopped otherwise. Changes no result.
+        cluster: address of the Dask scheduler that runs are sent to, such as
+            tcp://host:8786, or local:4 to start four workers on this machine. Needs the
+            extra [cluster].
+        split: with --cluster, do one run at a time and send its evaluations to the
+            workers.
     """
 
     study: tyro.conf.Positional[Annotated[str, word("STUDY")]]
@@ -76,9 +80,9 @@ def study(argv: Sequence[str]) -> int:
     if not 0 <= options.jobs <= JOBS_MAX:
         raise UserError(f"expected jobs from 0 to {JOBS_MAX}, got {options.jobs}")
     if options.split and options.cluster is None:
-        raise UserError("expected --cluster with --split: what to send evaluations to")
+        raise UserError("expected --cluster with --split, got --split alone")
     if options.jobs and options.cluster is not None:
-        raise UserError("expected --jobs or --cluster, got both: workers do the jobs")
+        raise UserError("expected --jobs or --cluster, got both")
     if options.cluster is not None:
         # an extra
         from evolution.study.cluster import check_address
@@ -115,7 +119,7 @@ def study(argv: Sequence[str]) -> int:
                 )
         except Interrupted:
             again = shell_command(MODULE, *argv)
-            print(f"Interrupted; go on with: {again}", file=sys.stderr)
+            print(f"Interrupted; continue with: {again}", file=sys.stderr)
             return interruption.status
     done = len(everything) - len(failed)
     minutes = (time.monotonic() - started) / 60
@@ -128,7 +132,7 @@ def study(argv: Sequence[str]) -> int:
 
 
 def _measure_yardstick(directory: StudyDirectory) -> None:
-    """Test the hand-written wall follower as champions are, unless it was before."""
+    """Test the hand-written wall follower as champions are, if that is not done yet."""
     if directory.yardstick.exists():
         return
     from evolution.judging.held_out import Judges
@@ -137,14 +141,14 @@ def _measure_yardstick(directory: StudyDirectory) -> None:
     config = next(iter(directory.stored_config().experiments.values()))
     judges, n = Judges().tested_on(config.robot, config.setting), config.test_starts
     tests = {robot: judge.test(WallFollower(), n) for robot, judge in judges.items()}
-    # whoever opens the study removes what looks left over
+    # opening the study removes what looks left over
     with locked(directory.path, PATIENCE), files.writing():
         text = json.dumps(KnownScores(held_out=tests).to_dict(), indent=1) + "\n"
         files.write_text(directory.yardstick, text)
 
 
 def _finished(job: Job, directory: StudyDirectory) -> bool:
-    """Whether the run needs no more work; a damaged directory fails later, alone."""
+    """Whether a run is finished; False for a damaged directory, which fails later."""
     run = directory.run(job.name, job.config.seed)
     try:
         return run.finished
@@ -153,7 +157,7 @@ def _finished(job: Job, directory: StudyDirectory) -> bool:
 
 
 def _events(jobs: Sequence[Job], options: Options) -> Iterator[Event]:
-    """The news of all jobs, wherever they are carried out."""
+    """Events of all jobs, from this machine or from a cluster."""
     if options.cluster is not None:
         # an extra
         from evolution.study.cluster import carry_out_on_cluster
@@ -168,7 +172,7 @@ def _events(jobs: Sequence[Job], options: Options) -> Iterator[Event]:
 
 
 def _cores() -> int:
-    """Cores that this process may use: a cluster's scheduler may have given it few."""
+    """Number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -177,7 +181,7 @@ def _cores() -> int:
 def _shown(
     everything: Sequence[Job], jobs: Sequence[Job], events: Iterator[Event]
 ) -> Iterator[Event]:
-    """The same events; a bar for the study and a line for each run that ends."""
+    """Pass events on and show them: a bar for the study, a line for each ended run."""
     budget = {job: job.config.evaluations for job in everything}
     waiting = set(jobs)
     done = {job: 0 if job in waiting else budget[job] for job in everything}
@@ -206,7 +210,7 @@ def _shown(
 
 
 def _line(job: Job) -> str:
-    """What a finished run has found."""
+    """Line that shows the scores of a finished run."""
     path = RunDirectory(job.directory).champion
     scores = Scores.read(load_controller(path).scores, path)
     return f"{job}: {scores.in_short}"

@@ -1,4 +1,4 @@
-"""What a study is: experiments that are run with the same seeds and compared."""
+"""Configuration of a study: experiments that are compared on the same seeds."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -29,7 +29,7 @@ class StudyConfig:
 
     @classmethod
     def load(cls, path: Path) -> Self:
-        """Read a study: `experiments`, a list, and `common`, keys that all share.
+        """Read a study from a file with the keys `experiments` and `common`.
 
         Each experiment is a shipped one or a YAML file; what `common` says wins.
 
@@ -60,7 +60,7 @@ class StudyConfig:
         return cls(MappingProxyType(experiments))
 
     def only(self, names: list[str]) -> Self:
-        """The experiments of those names.
+        """The study with only the experiments of these names.
 
         Raises:
             UserError: if one is not in the study.
@@ -79,7 +79,7 @@ class StudyConfig:
         return self.experiments[name].model_copy(update={"seed": seed})
 
     def merged(self, other: Self, path: Path) -> Self:
-        """This study, as it is stored at `path`, and the experiments of another.
+        """This study, stored at `path`, with the experiments of another one added.
 
         Raises:
             UserError: naming the keys in which an experiment of both differs.
@@ -96,13 +96,13 @@ class StudyConfig:
         return type(self)(MappingProxyType({**self.experiments, **other.experiments}))
 
     def to_yaml(self) -> str:
-        """All experiments with all their keys, as `from_yaml` reads them."""
+        """YAML text of all experiments with all their keys."""
         fields = {name: c.model_dump() for name, c in self.experiments.items()}
         return to_yaml(fields)
 
     @classmethod
     def from_yaml(cls, path: Path) -> Self:
-        """What `to_yaml` wrote to a file.
+        """Read what `to_yaml` wrote to a file.
 
         Raises:
             UserError: if it is not there, or damaged.
@@ -163,13 +163,13 @@ def seeds_text(seeds: Sequence[int]) -> str:
 
 
 def seeds_to_yaml(seeds: Mapping[str, Sequence[int]]) -> str:
-    """Ascending seeds of experiments by name, as `seeds_from_yaml` reads them."""
+    """YAML text of the ascending seeds of experiments by name."""
     texts = {name: seeds_text(each) for name, each in seeds.items()}
     return to_yaml(texts)
 
 
 def seeds_from_yaml(path: Path) -> dict[str, list[int]]:
-    """What `seeds_to_yaml` wrote to a file.
+    """Read what `seeds_to_yaml` wrote to a file.
 
     Raises:
         UserError: if it is damaged.

@@ -1,4 +1,4 @@
-"""What a study has found so far, read back from its directory."""
+"""Data of a study: its finished runs, read from its directory."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -78,7 +78,7 @@ class StudyData:
         return {name: self.runs[name] for name in self.configs if self.runs.get(name)}
 
     def alike(self, a: str, b: str) -> bool:
-        """Whether fitness of two experiments is worth the same, and costs the same."""
+        """Whether two experiments have comparable fitness and the same budget."""
         one, other = self.configs[a], self.configs[b]
         return one.setting == other.setting and one.budget == other.budget
 
@@ -101,7 +101,7 @@ class StudyData:
 
 
 def load_study(path: Path) -> StudyData:
-    """Everything in a study directory that is finished and sound.
+    """Read the finished and valid runs of a study directory.
 
     Raises:
         UserError: if it is not a study, has no finished run, or mixes trials of
@@ -210,7 +210,7 @@ def read_history(path: Path) -> dict[str, np.ndarray]:
 
 
 def _unpaired(runs: Mapping[str, tuple[RunData, ...]]) -> list[str]:
-    """Seeds that some experiments have and others lack, a line per experiment."""
+    """Lines about seeds that some experiments have and others lack."""
     seeds = {name: {run.seed for run in each} for name, each in runs.items()}
     everywhere = set().union(*seeds.values())
     return [

@@ -1,4 +1,4 @@
-"""The study directory: one run directory per experiment and seed, and what they are."""
+"""The study directory: a run directory per experiment and seed, and the config."""
 
 from collections.abc import Collection
 from pathlib import Path
@@ -15,7 +15,7 @@ PATIENCE = 10.0
 
 
 def champions(place: Path) -> list[Path]:
-    """The champion of the run at a place, or those of all runs of the study there."""
+    """Champion files of the run or of all runs of the study at a path."""
     if not files.is_directory(place):
         return []
     run = RunDirectory(place)
@@ -31,10 +31,10 @@ def champions(place: Path) -> list[Path]:
 
 
 class StudyDirectory:
-    """`study.yaml` and `<experiment>/seed-<n>/`, each as a single run leaves it."""
+    """Directory with `study.yaml` and run directories `<experiment>/seed-<n>/`."""
 
     def __init__(self, path: Path):
-        """Name the directory; nothing is touched yet."""
+        """Name the directory, without touching it."""
         self.path = path
         self.config = path / "study.yaml"
         self.asked = path / "seeds.yaml"
@@ -45,14 +45,14 @@ class StudyDirectory:
         return RunDirectory(self.path / name / f"{PREFIX}{seed}")
 
     def seeds(self, name: str) -> list[int]:
-        """Seeds of which there is a directory, in ascending order."""
+        """Seeds with a directory, in ascending order."""
         found = (path.name for path in (self.path / name).glob(f"{PREFIX}*/"))
         numbers = (part.removeprefix(PREFIX) for part in found)
         # not seed-01, a copy that a person made: it would count as seed 1 again
         return sorted(int(n) for n in numbers if n.isdecimal() and str(int(n)) == n)
 
     def asked_seeds(self) -> dict[str, list[int]]:
-        """Seeds that were ever asked for, by experiment; older studies do not say.
+        """All seeds asked for so far, by experiment; empty for older studies.
 
         Raises:
             UserError: if the file that says so is damaged.
@@ -62,7 +62,7 @@ class StudyDirectory:
         return seeds_from_yaml(self.asked)
 
     def open(self, config: StudyConfig, seeds: Collection[int]) -> None:
-        """Make the directory, or go on with it; experiments and seeds may join.
+        """Make or reuse the directory, and add experiments and seeds.
 
         Raises:
             UserError: if it is something else, another study, or cannot be written.
@@ -76,7 +76,7 @@ class StudyDirectory:
                     f"output '{self.path}' is not empty and holds no study: expected "
                     "a new directory, or one with a study.yaml"
                 )
-            # somebody else may be about to add experiments or seeds
+            # another process may be about to add experiments or seeds
             with locked(self.path, PATIENCE):
                 files.remove_leftovers(self.path)
                 asked = self.asked_seeds()
@@ -92,7 +92,7 @@ class StudyDirectory:
                 files.write_text(self.asked, seeds_to_yaml(asked))
 
     def _holds_anything(self) -> bool:
-        """Whether more is there than what a killed writer left behind."""
+        """Whether the directory holds more than leftovers of killed writers."""
         if not files.is_directory(self.path):
             return False
         return any(

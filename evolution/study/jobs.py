@@ -1,8 +1,8 @@
 """Jobs: the runs of a study, carried out side by side in processes of this machine.
 
-A process does one run after the other, so that MuJoCo and scipy are loaded once.
-Whatever becomes of one, memory exhausted and `kill -9` included, its run fails and the
-others go on. A process ends with the one that started it.
+A process does one run after the other, so that MuJoCo and scipy are loaded once. If a
+process dies, even by `kill -9` or for lack of memory, only its run fails and the others
+continue. A process ends with the one that started it.
 """
 
 import multiprocessing
@@ -23,7 +23,7 @@ from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 
 PATIENCE = 10.0
-"""How long a process waits for one that is about to leave its directory [s]."""
+"""How long to wait for another process to leave a run's directory [s]."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Event:
 
 
 def carry_out(job: Job, means: Means, report: Callable[[int], None]) -> None:
-    """Do a job, from wherever its directory stands.
+    """Start a job, or continue it from its directory.
 
     Args:
         job: what to do.
@@ -81,7 +81,7 @@ def carry_out(job: Job, means: Means, report: Callable[[int], None]) -> None:
 
 
 def generations(job: Job, means: Means) -> Generator[int]:
-    """The same step by step: evaluations done, once per generation.
+    """Do a job; yield the number of evaluations done after each generation.
 
     Raises:
         UserError: for anything the user can put right.
@@ -109,7 +109,7 @@ def generations(job: Job, means: Means) -> Generator[int]:
 def carry_out_side_by_side(
     jobs: Sequence[Job], means: Means, n_processes: int
 ) -> Iterator[Event]:
-    """Do all jobs, at most so many at once; the processes end with this generator."""
+    """Do all jobs, some side by side; closing the generator ends the processes."""
     waiting = list(reversed(jobs))
     idle: list[_Worker] = []
     busy: dict[Connection, tuple[Job, _Worker]] = {}
@@ -143,10 +143,10 @@ def carry_out_side_by_side(
 
 
 class _Worker:
-    """A process that does jobs, and the line on which it gets and reports them."""
+    """A process that does jobs, and the pipe on which it gets and reports them."""
 
     def __init__(self, means: Means):
-        """Start it; it ignores Ctrl-C, which is for its parent to act on."""
+        """Start the process, which ignores Ctrl-C, as its parent ends it."""
         # a fresh interpreter: threads and MuJoCo do not survive a fork
         context = multiprocessing.get_context("spawn")
         self.line, theirs = context.Pipe()
@@ -156,7 +156,7 @@ class _Worker:
         theirs.close()
 
     def ending(self) -> str:
-        """Wait for its end, and say why it came."""
+        """Wait for the end of the process; the reason."""
         self.process.join()
         self.line.close()
         status = self.process.exitcode or 0
@@ -166,7 +166,7 @@ class _Worker:
 
 
 def _work(means: Means, line: Connection) -> None:
-    """What a worker does: jobs as they come, until nobody is there to send any."""
+    """Main function of a worker: does jobs until its pipe is closed."""
     threading.Thread(target=_die_with_parent, daemon=True).start()
     try:
         while True:
@@ -186,7 +186,7 @@ def _work(means: Means, line: Connection) -> None:
 
 
 def failure_of(job: Job, error: Exception) -> str:
-    """Why a job failed, on one line; what is nobody's to put right leaves a log."""
+    """Why a job failed, on one line; an unexpected error also leaves a log."""
     if isinstance(error, UserError):
         return str(error)
     log = failure_log(job.directory)
@@ -197,7 +197,7 @@ def failure_of(job: Job, error: Exception) -> str:
 
 
 def failure_log(directory: Path) -> Path:
-    """Where the traceback of a run that failed is kept, beside its directory."""
+    """Path of the traceback of a failed run, beside its directory."""
     return directory.with_name(f"{directory.name}.failure.txt")
 
 

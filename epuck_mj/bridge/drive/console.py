@@ -1,4 +1,4 @@
-"""What a bridge tells its operator: a line that lives, and a summary."""
+"""What a bridge prints: a status line that is rewritten, and a summary."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from epuck_mj.bridge.drive.session import Session, Step
 
 
 def live_line(step: Step, robot: RealRobot) -> str:
-    """A control step in less than 80 characters: counts, speeds, timing.
+    """Status of a control step in less than 80 characters: counts, speeds, timing.
 
     Speeds are those sent; of a dry run, those that would have been.
     """
@@ -26,7 +26,7 @@ HEADING = (
 
 
 def drive_summary(session: Session, robot: RealRobot) -> str:
-    """What a session came to, a fact a line."""
+    """Summary of a session, one fact per line."""
     steps = session.steps
     fitness = sum(float(step.control.fitness) for step in steps)
     lines = [

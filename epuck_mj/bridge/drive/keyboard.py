@@ -1,6 +1,6 @@
-"""The operator's key: a terminal's keys one by one, without Enter.
+"""Stop keys of a terminal, read one by one without Enter.
 
-Where standard input is no terminal, nobody can press a key.
+Without a terminal as standard input there are no keys.
 """
 
 import os
@@ -20,15 +20,15 @@ STOP_KEYS = b"q "
 
 
 class Keyboard:
-    """Keys of a terminal, or of none."""
+    """Keys of a terminal, or no keys without a terminal."""
 
     def __init__(self, handle: int | None) -> None:
-        """Keys of the terminal with this file descriptor; None is no terminal."""
+        """Read the terminal with this file descriptor; None is no terminal."""
         self._handle = handle
 
     @property
     def there(self) -> bool:
-        """Whether there are any keys."""
+        """Whether there is a terminal to read keys from."""
         return self._handle is not None
 
     def stop_wanted(self) -> bool:
@@ -48,7 +48,7 @@ class Keyboard:
 
 @contextmanager
 def keyboard() -> Iterator[Keyboard]:
-    """The keys of standard input while the block lasts; then Enter is needed again."""
+    """Keys of standard input during the block, without Enter."""
     if not (termios and tty) or sys.stdin is None or not sys.stdin.isatty():
         yield Keyboard(None)
         return

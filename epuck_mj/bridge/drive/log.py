@@ -1,4 +1,4 @@
-"""The log of a real robot: a trajectory and a recording, as of a simulated one."""
+"""Log of a real robot: a trajectory and a recording, as for a simulated robot."""
 
 from datetime import datetime
 from pathlib import Path
@@ -38,7 +38,7 @@ def log_name(name: Path | None) -> Path:
 def save_log(
     name: Path, session: Session, policy: Policy, scene: Scene, summary: str
 ) -> list[Path]:
-    """Write what there is; the files written, none if nothing was read.
+    """Write the log; the files written, none if nothing was read.
 
     Args:
         name: of the files without their endings.

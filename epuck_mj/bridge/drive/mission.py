@@ -1,4 +1,4 @@
-"""One drive of a real robot, from the first word to the log."""
+"""One drive of a real robot, from the greeting to the log."""
 
 import sys
 import time
@@ -20,18 +20,18 @@ from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import Policy, TaskParameters
 
 QUIET_PERIOD = 1.0
-"""Time between two lines where they are not read on a terminal [s]."""
+"""Time between two status lines where output is no terminal [s]."""
 
 
 @dataclass(frozen=True)
 class Mission:
-    """What a robot has to do.
+    """Settings of one drive of a robot.
 
     Attributes:
         policy: that drives it.
         task: control step, speeds, fitness.
         scene: to show the log in.
-        calibration: in what the robot differs from the robot of the books.
+        calibration: how the robot differs from the nominal one.
         n_steps: control steps.
         start: pose: x, y [m], yaw [rad].
         speed_max: no wheel rolls faster than this [m/s].
@@ -99,7 +99,7 @@ def accomplish(
             status = interruption.status
             still = "the robot stands still" if robot and robot.met else "never began"
             word = f"{interruption.signum.name}: ended, {still}"
-        # nobody may be there to read the rest
+        # stdout may be closed
         if status:
             print(word, file=sys.stderr, flush=True)
         print(facts, flush=True)
@@ -119,7 +119,7 @@ def _drive(
     keys: Keyboard,
     clock: Callable[[], float],
 ) -> str:
-    """Why it ended as planned."""
+    """Drive the robot; why the drive ended as planned."""
     greeting = robot.greet()
     print(f"{greeting.firmware}; battery {greeting.battery}", flush=True)
     if mission.calibrate:
@@ -148,7 +148,7 @@ def _drive(
 def _save(
     mission: Mission, session: Session, robot: RealRobot | None
 ) -> tuple[str, UserError | None]:
-    """Write the log; what to say of it all, and what went wrong with the log."""
+    """Write the log; the summary, and the error if the log could not be written."""
     if robot is None or session.start is None:
         return "", None
     facts = drive_summary(session, robot)
@@ -161,7 +161,7 @@ def _save(
 
 
 def _runaway(error: StillMoving) -> str:
-    """What a person has to know who may have to run after a robot."""
+    """Warning that the robot may still move."""
     cause = error.__context__
     before = f"; at first: {cause}" if isinstance(cause, BridgeError) else ""
     return f"error: THE MOTORS MAY STILL TURN, switch the robot off: {error}{before}"

@@ -1,4 +1,4 @@
-"""Where a robot is, by the steps that its motors have made."""
+"""Odometry: where a robot is, from the steps that its motors have made."""
 
 import numpy as np
 
@@ -24,7 +24,7 @@ class Odometry:
     """
 
     def __init__(self, calibration: Calibration, start: np.ndarray) -> None:
-        """A robot at rest where it starts.
+        """Start with a robot at rest.
 
         Args:
             calibration: the robot's wheel radii and track.
@@ -38,7 +38,7 @@ class Odometry:
         self.length = 0.0
 
     def update(self, counters: Steps, asked: float, now: float) -> None:
-        """Move by what the counters say; the first call only tells where they start.
+        """Move by the counters' change; the first call only sets their start.
 
         Both wheels' speeds are taken as constant since the last call: an arc.
 

@@ -1,4 +1,4 @@
-"""A real robot as `control.Robot`: what drives the simulated one drives this one."""
+"""A real robot with the interface `control.Robot` of simulated ones."""
 
 import time
 from collections.abc import Callable
@@ -37,7 +37,7 @@ class Moment:
 
 
 class RealRobot:
-    """A robot on a connection; leaving its `with` block stops it, whatever happened.
+    """A robot on a connection; the end of its `with` block stops it in any case.
 
     A control step is two questions. As it starts, its speeds, if they changed: the echo
     in the answer shows that they arrived. As it ends, the reading. So the policy
@@ -65,11 +65,11 @@ class RealRobot:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Take a connection, on which nothing is sent yet.
+        """Use a connection, without sending anything.
 
         Args:
             connection: how to reach it.
-            calibration: in what it differs from the robot of the books.
+            calibration: how it differs from the nominal robot.
             control_step: duration of a control step [s].
             speed_max: no wheel rolls faster than this [m/s].
             dry_run: whether it has to stand still all the time.
@@ -92,15 +92,15 @@ class RealRobot:
 
     @property
     def n_repairs(self) -> int:
-        """How often host and robot had to find each other again."""
+        """How often host and robot had to synchronise again."""
         return self._connection.n_repairs
 
     def poses(self) -> np.ndarray:
-        """See `Robot.poses`: nobody knows, odometry begins anywhere."""
+        """See `Robot.poses`: unknown, NaN."""
         return np.full(3, np.nan)
 
     def clearances(self) -> np.ndarray:
-        """See `Robot.clearances`: nobody knows."""
+        """See `Robot.clearances`: unknown, NaN."""
         return np.array(np.nan)
 
     def __enter__(self) -> Self:
@@ -108,7 +108,7 @@ class RealRobot:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Stop it, if it ever answered.
+        """Stop the robot, if it ever answered.
 
         Raises:
             StillMoving: if it does not say that it stopped.
@@ -120,17 +120,17 @@ class RealRobot:
             self._connection.close()
 
     def greet(self) -> Greeting:
-        """Who is there; it stands still."""
+        """Greet the robot and stop it; its version and battery."""
         greeting = self._connection.greet()
         self.met = True
         return greeting
 
     def calibrate(self) -> None:
-        """Let it set its sensors' zero; nothing may be near. It stands still."""
+        """Let the resting robot set its sensors' zero; nothing may be near it."""
         self._connection.calibrate()
 
     def begin(self) -> Reading:
-        """The first reading; the first control step starts now."""
+        """Start the first control step; the first reading."""
         self._origin = self._clock()
         self.waited = 0.0
         # as at every tick: first the reading, then what comes of it
@@ -138,7 +138,7 @@ class RealRobot:
         return self._sense()
 
     def step(self, command: np.ndarray) -> Reading:
-        """Drive for one control step; what is sensed at its end.
+        """Drive for one control step; the reading at its end.
 
         Args:
             command: wheel speeds [rad/s], `(2,)`.
@@ -180,7 +180,7 @@ class RealRobot:
         return Reading(distance, np.zeros((), bool), counts)
 
     def _cycle(self, rates: tuple[int, int], changed: bool) -> np.ndarray:
-        """Counts `(8,)` as they are now; keeps the time and the odometry."""
+        """Current counts `(8,)`; updates time and odometry."""
         asked = self._clock()
         if asked > self._fresh_until:
             age = asked - self._fresh_until + READING_AGE_MAX

@@ -1,11 +1,11 @@
-"""When control steps end: every so often, by a clock that never goes back."""
+"""Schedule of control steps, by a monotonic clock."""
 
 import time
 from collections.abc import Callable
 
 
 class Schedule:
-    """Ticks at equal distances.
+    """Ticks at equal intervals.
 
     A step that is not done when its tick comes is an overrun: the next tick then comes
     a whole period after the late one, so no step is shorter than the others.
@@ -38,7 +38,7 @@ class Schedule:
         self._tick = self._clock() + self._period
 
     def wait(self) -> None:
-        """Let the time go by until the next tick."""
+        """Wait until the next tick."""
         left = self._tick - self._clock()
         if left < 0:
             self.n_overruns += 1

@@ -1,4 +1,4 @@
-"""A policy at the wheel of a real robot: the control loop, and what it leaves behind.
+"""The control loop of a real robot, and the trajectory it records.
 
 The step is `control.control_step`, the one of every simulation.
 """
@@ -40,7 +40,7 @@ class Step:
 
 @dataclass
 class Session:
-    """All that was seen of a robot, also when it ended before its time.
+    """Record of a drive, complete or interrupted.
 
     Attributes:
         task: what the robot is at.
@@ -57,10 +57,10 @@ class Session:
     def drive(
         self, robot: RealRobot, policy: Policy, n_steps: int, clock: Callable[[], float]
     ) -> Iterator[Step]:
-        """Control steps as they happen; the robot is left as it drives.
+        """Yield control steps as they happen; does not stop the robot.
 
         Args:
-            robot: to drive; whoever called stops it.
+            robot: to drive; the caller stops it.
             policy: called with observations `(8,)`, gives actions `(2,)`.
             n_steps: how many there are at most.
             clock: the robot's.
@@ -82,9 +82,9 @@ class Session:
             yield step
 
     def trajectory(self, policy: Policy) -> Trajectory | None:
-        """What happened, as from a simulation; None if nothing was read.
+        """Trajectory of the drive, as of a simulated one; None if nothing was read.
 
-        The pose is by odometry; nobody knows of contacts; commands are those sent.
+        The pose is odometry; contacts are unknown; commands are those sent.
         """
         if self.start is None or self.reading is None:
             return None
@@ -109,5 +109,5 @@ class Session:
 
 
 def _rows(pairs: list[np.ndarray]) -> np.ndarray:
-    """Pairs as `(n, 2)`, also if there are none."""
+    """Array `(n, 2)` of pairs, which may be none."""
     return np.array(pairs, float).reshape(-1, 2)

@@ -1,13 +1,12 @@
 """A robot to try the bridge on: `python -m epuck_mj.bridge.fake`.
 
-An e-puck's firmware, quirks included, in a body that lives in MuJoCo. Whoever opens its
-port finds nothing that a real one would not say.
+An e-puck's firmware, oddities included, with a body that is simulated by MuJoCo. Its
+port sends only what a real robot would send.
 
-- `firmware`, `wifi_firmware`: what the robot's programs make of bytes; the `builds`
-  there are;
-- `motors_and_sensors`: what these programs move and read; `mujoco_body`: a body of them
-  in a scene;
-- `scenarios`: what goes wrong, and when; `wire`: where bytes are late or lost;
-- `emulator`: body, firmware and wires; bytes and times are arguments;
-- `endpoints`: a pseudo-terminal or a TCP port around it, in real time.
+- `firmware`, `wifi_firmware`: the robot's programs; `builds`: their versions;
+- `motors_and_sensors`: motors and sensors of these programs; `mujoco_body`: a body with
+  them in a scene;
+- `scenarios`: faults and their times; `wire`: a line that delays or loses bytes;
+- `emulator`: body, firmware and wires, with bytes and times as arguments;
+- `endpoints`: a pseudo-terminal or a TCP port of the emulator, in real time.
 """

@@ -20,7 +20,7 @@ from epuck_mj.host.interruption import Interrupted, Interruption
 MODULE = "epuck_mj.bridge.fake"
 RANDOM = "random"
 RANDOM_END = 10.0
-"""No fault of a random scenario starts later than this [s]."""
+"""Latest start of a fault in a random scenario [s]."""
 
 
 EXAMPLES = (
@@ -31,23 +31,24 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Options:
-    """An e-puck that lives in MuJoCo behind a serial port, until Ctrl-C.
+    """Emulate an e-puck with a body in MuJoCo behind a serial port, until Ctrl-C.
 
     Attributes:
-        arena: shipped arena, or path of an MJCF with walls.
-        robot: shipped robot, or path of an MJCF.
-        pose: where it starts, x and y [m] and direction [degrees].
+        arena: name of a shipped arena, or path of an MJCF file.
+        robot: name of a shipped robot, or path of an MJCF file.
+        pose: start: x and y [m] and heading [degrees].
         firmware: asercom, btcom or epuck2.
-        link: name of its pseudo-terminal, a symbolic link; in a temporary folder if
+        link: path of a symbolic link to the pseudo-terminal; in a temporary folder if
             not given.
-        tcp: speak on this TCP port instead, as socket://127.0.0.1:PORT; 0 is any.
-        wifi: be an e-puck2 that speaks its packets on this TCP port; 0 is any.
-        scenario: what goes wrong, as in stall@2,loss@4+1, or random: loss, garbage,
-            noise, stall, disconnect, gone, reset, at a time since the first byte [s].
-        seed: of random scenarios, garbage and lost bytes.
-        latency: of each way [s], beside the UART's.
-        speed: how many times faster than real its time goes by.
-        journal: file for all that it did, an .npz.
+        tcp: listen on this TCP port instead, as socket://127.0.0.1:PORT; 0 is any.
+        wifi: emulate an e-puck2 over WiFi, on this TCP port; 0 is any.
+        scenario: faults, such as stall@2,loss@4+1, or random. The faults are loss,
+            garbage, noise, stall, disconnect, gone and reset, each with its time since
+            the first byte [s].
+        seed: seed of random scenarios, garbage and lost bytes.
+        latency: delay of each direction [s], in addition to the UART's.
+        speed: how many times faster than real time the emulation runs.
+        journal: file (.npz) to record everything that the robot did to.
     """
 
     arena: Annotated[str, word("ARENA")] = "arena"

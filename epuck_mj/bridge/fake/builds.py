@@ -1,4 +1,4 @@
-"""The e-pucks there are to emulate: hardware and firmware together.
+"""The e-pucks that can be emulated: hardware and firmware together.
 
 Source: gctronic/e-puck-library, `Asercom.c`, `BTcom.c`; e-puck2/e-puck2_main-processor,
 `Asercom2.c`, `motors.h`. The banner's second line and the hardware versions are ours.
@@ -76,4 +76,4 @@ BUILDS = {
         tells_battery=False,
     ),
 }
-"""The robots there are, by name."""
+"""Robots that can be emulated, by name."""

@@ -1,4 +1,4 @@
-"""An e-puck at the other end of a line where things go wrong. Bytes and times only."""
+"""An emulated e-puck on a line with faults: bytes and times, no I/O."""
 
 from collections.abc import Sequence
 
@@ -37,7 +37,7 @@ class Emulator:
         latency: float = 0.0,
         seed: int = 0,
     ) -> None:
-        """Switch it on.
+        """Switch the robot on.
 
         Args:
             body: of the robot.
@@ -70,11 +70,11 @@ class Emulator:
         return not (self._there.idle and self._back.idle)
 
     def connected(self, now: float) -> bool:
-        """Whether its port is there at a time [s]."""
+        """Whether the robot's port exists at a time [s]."""
         return not self._lasting({"disconnect", "gone"}, now)
 
     def exchange(self, heard: bytes, now: float) -> bytes:
-        """What reaches the host now; to be called often, for time goes by in it.
+        """Let time pass; the bytes that reach the host. To be called often.
 
         Args:
             heard: what the host has sent since the last call.
@@ -111,7 +111,7 @@ class Emulator:
         return [f for f in self._faults if f.kind in kinds and f.lasts(time)]
 
     def _befall(self, now: float) -> None:
-        """What happens at once, and once."""
+        """Carry out a fault that happens once."""
         if self._begun is None:
             return
         for fault in self._faults:

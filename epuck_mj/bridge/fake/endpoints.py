@@ -1,7 +1,7 @@
-"""Where a host finds an emulated robot: a pseudo-terminal or a TCP port, in real time.
+"""Endpoints of an emulated robot: a pseudo-terminal or a TCP port, in real time.
 
-Both serve one host at a time, on this computer only, and vanish and return with the
-scenario.
+Both serve one host at a time, on this computer only. A scenario can make them vanish
+and return.
 """
 
 import contextlib
@@ -18,10 +18,10 @@ from epuck_mj.errors import UserError
 LOCALHOST = "127.0.0.1"
 
 IDLE_TIME, BUSY_TIME = 0.004, 0.0005
-"""How long it sleeps when nothing, or something, is under way [s]."""
+"""Sleep between exchanges when no bytes, or some, are under way [s]."""
 
 HEARD_MAX = 4096
-"""Most bytes heard at once."""
+"""Largest number of bytes received at once."""
 
 
 class Pty:
@@ -76,23 +76,23 @@ class Pty:
         os.close(self._slave)
 
     def handles(self) -> list[int]:
-        """File descriptors on which something may come."""
+        """File descriptors that bytes may arrive on."""
         return [self._master] if self.is_open else []
 
     def receive(self) -> bytes:
-        """What came; does not wait."""
+        """The bytes that have arrived; does not wait."""
         with contextlib.suppress(BlockingIOError):
             return os.read(self._master, HEARD_MAX)
         return b""
 
     def send(self, data: bytes) -> None:
-        """Give the host what it takes; the rest is lost, as is all if it is away."""
+        """Send what the host accepts; the rest is lost, all if it is not connected."""
         with contextlib.suppress(BlockingIOError):
             os.write(self._master, data)
 
 
 class Tcp:
-    """A TCP port on this computer, with all that a Pty has."""
+    """A TCP port on this computer, with the interface of Pty."""
 
     def __init__(self, port: int) -> None:
         """Appear.
@@ -101,7 +101,7 @@ class Tcp:
             port: its number; 0 takes any that is free.
 
         Raises:
-            UserError: if somebody else has it.
+            UserError: if another program has it.
         """
         self._port = port
         self._host: socket.socket | None = None
@@ -187,7 +187,7 @@ def serve(
     clock: Callable[[], float],
     wanted: Callable[[], bool],
 ) -> None:
-    """Let a robot live behind an endpoint, which is closed in the end.
+    """Run a robot behind an endpoint, and close the endpoint in the end.
 
     Args:
         emulator: the robot.

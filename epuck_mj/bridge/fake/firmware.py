@@ -1,22 +1,21 @@
-"""An emulated e-puck that listens to a serial line: v1 with either firmware, or v2.
+"""An emulated e-puck on a serial line: v1 with either firmware, or v2.
 
-It does what the real ones do, quirks included:
+It behaves like the real ones, oddities included:
 
 - one parser, which waits for operands for ever; no watchdog, no echo, no checksum;
-- a zero between commands is ignored; a return that ends no line makes of the next byte
-  the first one of a line, even if it is a binary command;
+- a zero between commands is ignored; after a return that ends no line, the next byte
+  begins a line, even if it is a binary command;
 - binary replies come once, after the packet's zero; a packet of D, L and P has none;
-- while it calibrates it serves nobody, and its receive ring overflows;
+- while it calibrates it handles no commands, and its receive ring overflows;
 - the banner comes at a reset only; a reset forgets everything;
-- speeds saturate in silence while E tells them as they came; see `motors_and_sensors`
-  for what the motors make of them.
+- speeds saturate without a message, while E reports them unsaturated; see
+  `motors_and_sensors` for the speeds of the motors.
 
-It speaks C, D, E, K, L, N, O, P, Q, R, S, V, and Asercom `b`; to the other letters it
-is a robot that doesn't know them. It opens nothing and waits for nothing: bytes and
-times are arguments.
+It knows C, D, E, K, L, N, O, P, Q, R, S, V, and Asercom `b`, and answers other letters
+as unknown. It opens no port and never waits: bytes and times are arguments.
 
-Where the code leaves room, it was decided: S makes E say 0,0; operands that are
-missing keep their last value; a full ring begins from its start and so loses all.
+The source code leaves three things open. Here, E reports 0,0 after S; missing operands
+keep their last value; a full receive ring starts again and so loses its bytes.
 
 Source: gctronic/e-puck-library, `Asercom.c`, `BTcom.c`, `e_uart1_rx_char.s`;
 e-puck2/e-puck2_main-processor, `Asercom2.c`; GCtronic's wiki, "Advanced sercom
@@ -37,18 +36,18 @@ from epuck_mj.constants import BATTERY_LOW, N_LEDS, RECEIVE_RING
 _RING = range(N_LEDS)
 
 BINARY_OPERANDS = {"D": 4, "L": 2, "P": 4}
-"""Operand bytes of the binary commands that have any."""
+"""Number of operand bytes of the binary commands with operands."""
 
 
 class Firmware(Talker):
-    """A robot's firmware, from its power switch on.
+    """A robot's firmware, from the moment it is switched on.
 
     Attributes:
         leds: of the ring, then the body's and the front one: 0 is off, 1 on.
     """
 
     def __init__(self, body: Body, build: Build, now: float) -> None:
-        """Switch it on: there is a banner to be read.
+        """Switch the robot on, which sends its banner.
 
         Args:
             body: what it moves and senses with.
@@ -60,7 +59,7 @@ class Firmware(Talker):
         self.reset(now)
 
     def reset(self, now: float) -> None:
-        """Press its reset button at a time [s], never less than before."""
+        """Press the robot's reset button at a time [s], never less than before."""
         self.leds: list[int] = [0] * (N_LEDS + 2)
         self._motors = Motors(self._body, self._build.timer)
         self._sensors = ProximitySensors(self._body, self._build.period, now)
@@ -147,7 +146,7 @@ class Firmware(Talker):
         return b""
 
     def _ascii(self, line: bytes) -> None:
-        """Carry out a line."""
+        """Carry out a line in ASCII."""
         letter = chr(line[0])
         if letter == "b" and self._build.tells_battery:
             self._say("b", [int(self._body.battery() >= BATTERY_LOW)])

@@ -1,7 +1,7 @@
-"""The emulated e-puck below its firmware's commands: motors, sensors, and the body.
+"""Motors, sensors and body of the emulated e-puck, below its firmware.
 
-The body is anything with wheels and sensors, for instance a MuJoCo robot; here is what
-the firmware's timers make of it.
+The body is anything with wheels and sensors, for instance a robot in MuJoCo. This
+module times its motors and sensors as the firmware's timers do.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from epuck_mj.step.motors import actual_rates
 
 @dataclass(frozen=True)
 class Wheel:
-    """What a motor does from now on.
+    """What a motor does until the next command.
 
     Attributes:
         rate: speed at which it really turns [steps/s]; forward is positive.
@@ -34,14 +34,14 @@ class Wheel:
 
 
 class Body(Protocol):
-    """What the firmware needs of a robot."""
+    """Body of a robot, as the firmware needs it."""
 
     def drive(self, left: Wheel, right: Wheel) -> None:
-        """The wheels turn so until the next call."""
+        """Turn the wheels at these speeds until the next call."""
         ...
 
     def steps(self) -> tuple[int, int]:
-        """Steps that the left and the right motor have made since ever, not wrapped."""
+        """Steps that the left and the right motor have made in all, not wrapped."""
         ...
 
     def proximity(self) -> np.ndarray:
@@ -126,7 +126,7 @@ class Motors:
         self.count_from(0, 0)
 
     def drive(self, left: int, right: int) -> None:
-        """Turn at these speeds [steps/s], as well as the motors can."""
+        """Turn at the speeds nearest to these [steps/s] that the motors can make."""
         before, self.commanded = self.commanded, (left, right)
         self._body.drive(*map(self._timer.wheel, self.commanded, before))
 
@@ -136,20 +136,20 @@ class Motors:
         self._origin = (made[0] - left, made[1] - right)
 
     def counters(self) -> tuple[int, int]:
-        """Steps since they were set, in 16 bits."""
+        """Steps since the counters were set, in 16 bits."""
         left, right = self._body.steps()
         return wrapped(left - self._origin[0]), wrapped(right - self._origin[1])
 
 
 class ProximitySensors:
-    """The proximity sensors, read anew periodically, and their calibration.
+    """The proximity sensors, sampled periodically, and their calibration.
 
     Attributes:
         n_told: how often their counts were asked for.
     """
 
     def __init__(self, body: Body, period: float, now: float) -> None:
-        """Sensors that are not calibrated.
+        """Start without a calibration.
 
         Args:
             body: what senses.
@@ -171,7 +171,7 @@ class ProximitySensors:
         return self._missing > 0
 
     def calibrate(self) -> None:
-        """Take the mean of the next samples for the offsets."""
+        """Start a calibration: the mean of the next samples becomes the offsets."""
         self._sum[:] = 0
         self._missing = CALIBRATION_SAMPLES
 

@@ -1,10 +1,10 @@
 """The emulated e-puck's body: a robot in a scene of MuJoCo.
 
-Time is cut into physics steps. A command takes effect with the next one, and what is
-sensed belongs to the last; both are noted, so that a simulation can be given the same
-times. When a robot that was told to stand is told to drive, its physics steps are
-shifted to end `LEAD` after that moment: a host that keeps a steady pace is then
-not a step early or late for being a millisecond early or late.
+Time is divided into physics steps. A command takes effect in the next step, and a
+sensor reading is that of the last step. Both are recorded, so that a simulation can be
+given the same times. When a standing robot is told to drive, its physics steps are
+shifted to end `LEAD` after that moment. Then a command of a host with a steady pace
+that comes a millisecond early or late still falls into the same physics step.
 """
 
 import math
@@ -22,19 +22,19 @@ from epuck_mj.step.motors import STEP_ANGLE
 from epuck_mj.step.sensors import Reading, proximity
 
 LEAD = 0.0045
-"""Time by which later commands may be late for their physics step [s]. Chosen.
+"""Longest time from a command to the end of its physics step [s]. Chosen.
 
 Readings, asked for some 4 ms before commands, then see samples of 16 ms all in the same
 physics step if that is one of 25 ms.
 """
 
 DARK = 3900
-"""Counts of ambient light in a room [counts]: chosen, nothing here depends on it."""
+"""Counts of ambient light in a room: chosen, nothing depends on it."""
 
 
 @dataclass
 class Journal:
-    """What a body did; a physics step ends in each row of `pose`.
+    """Record of a body; each row of `pose` is the end of a physics step.
 
     Attributes:
         pose: `(steps + 1)` of `(3,)`: x, y [m], yaw [rad].
@@ -55,7 +55,7 @@ class Journal:
     told: list[int] = field(default_factory=list)
 
     def save(self, path: Path, timestep: float) -> None:
-        """Write an .npz of it, with the physics step [s].
+        """Write the journal as .npz, with the physics step [s].
 
         Raises:
             UserError: if that is not possible.
@@ -75,7 +75,7 @@ class MujocoBody:
     """
 
     def __init__(self, scene: Scene, start: np.ndarray, now: float) -> None:
-        """A robot at rest.
+        """Place the robot at rest.
 
         Args:
             scene: robot and arena.
@@ -98,16 +98,16 @@ class MujocoBody:
 
     @property
     def pose(self) -> np.ndarray:
-        """Where it really is, `(3,)`: x, y [m], yaw [rad]."""
+        """True pose, `(3,)`: x, y [m], yaw [rad]."""
         return self.journal.pose[-1]
 
     @property
     def standing(self) -> bool:
-        """Whether its motors are told to stand."""
+        """Whether the motors are commanded to stand still."""
         return not any(wheel.rate for wheel in self.wheels)
 
     def advance(self, now: float) -> None:
-        """Let the time go by until `now` [s], never less than before."""
+        """Simulate up to the time `now` [s], never less than before."""
         self._now = now
         while self._origin + (self._n_steps + 1) * self._timestep <= now:
             self._step()
@@ -137,7 +137,7 @@ class MujocoBody:
         return counts
 
     def told(self, times: int) -> None:
-        """Note that the latest sample went to the host so many times."""
+        """Record how often the latest sample was sent to the host."""
         self.journal.told += [len(self.journal.sample) - 1] * times
 
     def ambient(self) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What goes wrong between the bridge and its robot, and when.
+"""Scenarios: faults between the bridge and its robot, and their times.
 
 A scenario is text: `stall@2` is a stall 2 s after the first byte was heard,
 `loss@1+0.5,reset@4` are two faults, the first half a second long.
@@ -14,7 +14,7 @@ from epuck_mj.errors import UserError
 
 @dataclass(frozen=True)
 class Kind:
-    """A fault there is.
+    """A kind of fault.
 
     Attributes:
         duration: of it, if nothing else is said [s].
@@ -27,25 +27,25 @@ class Kind:
 
 KINDS = {
     "loss": Kind(0.5, "a byte in fifty is lost, both ways"),
-    "garbage": Kind(0.0, "bytes that nobody sent reach the host"),
-    "noise": Kind(0.0, "bytes that nobody sent reach the robot"),
+    "garbage": Kind(0.0, "random bytes reach the host"),
+    "noise": Kind(0.0, "random bytes reach the robot"),
     "stall": Kind(0.5, "nothing gets through, both ways, and then all of it"),
     "disconnect": Kind(1.0, "the port vanishes, and returns"),
     "gone": Kind(float("inf"), "the port vanishes for ever"),
     "reset": Kind(0.0, "the robot starts anew"),
 }
-"""The faults there are, by name."""
+"""The kinds of faults, by name."""
 
 LOSS = 0.02
-"""Probability that a byte is lost while bytes are."""
+"""Probability that a byte is lost during the fault `loss`."""
 
 GARBAGE_MAX = 40
-"""Most bytes of garbage at once."""
+"""Largest number of bytes of garbage at once."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """Something that goes wrong.
+    """A fault at a time.
 
     Attributes:
         kind: one of KINDS.
@@ -58,7 +58,7 @@ class Fault:
     duration: float
 
     def lasts(self, time: float) -> bool:
-        """Whether it goes on at that time since the first byte [s]."""
+        """Whether the fault lasts at that time since the first byte [s]."""
         return self.start <= time < self.start + self.duration
 
     def __str__(self) -> str:
@@ -86,7 +86,7 @@ def scenario(text: str) -> tuple[Fault, ...]:
 
 
 def random_scenario(seed: int, end: float) -> tuple[Fault, ...]:
-    """One to three faults.
+    """A random scenario of one to three faults.
 
     Args:
         seed: decides everything.

@@ -1,4 +1,4 @@
-"""What is alike in all emulated firmwares: they hear, and speak as time goes by."""
+"""Base of the emulated firmwares, which receive bytes and send replies in time."""
 
 from abc import ABC, abstractmethod
 
@@ -6,30 +6,30 @@ from epuck_mj.bridge.fake.motors_and_sensors import Body, ProximitySensors
 
 
 class Talker(ABC):
-    """A firmware on a body. Times are arguments, none less than the one before."""
+    """A firmware on a body; the times it is given never decrease."""
 
     _sensors: ProximitySensors
 
     def __init__(self, body: Body) -> None:
-        """It has said nothing; it moves and senses with a body."""
+        """Start a firmware on a body."""
         self._body = body
         self._out = bytearray()
 
     @property
     def n_told(self) -> int:
-        """How often it has told its proximity counts since it started."""
+        """How often proximity counts were sent since the start."""
         return self._sensors.n_told
 
     def feed(self, data: bytes, now: float) -> None:
-        """Let it hear any number of bytes at a time [s]."""
+        """Receive any number of bytes at a time [s]."""
         self._advance(now)
         self._hear(data)
 
     def output(self, now: float) -> bytes:
-        """What it has said since the last call, up to a time [s].
+        """The bytes sent since the last call, up to a time [s].
 
-        To be called often: it also is what makes time go by, and sensors are read
-        when their time has come and somebody calls.
+        To be called often: time passes only in this call, and sensors are read at the
+        first call after their time.
         """
         self._advance(now)
         out = bytes(self._out)

@@ -1,12 +1,12 @@
 """An emulated e-puck2 that listens on TCP, selector at 15.
 
-It says nothing until its first command, then streams packets for ever, even when
-nobody is left; the last speeds persist. Commands wait for their turn, one a packet;
-those that find the queue full are dropped. It fills in what the bridge reads:
-proximity, ambient light, steps and selector; everything else in a packet is zero.
+It sends nothing until its first command, then streams packets for ever, even without a
+connection; the last speeds persist. Commands wait in a queue, from which each packet
+takes one; commands that find the queue full are dropped. A packet holds proximity,
+ambient light, steps and selector; everything else in it is zero.
 
-Where the sources leave room, it was decided: what comes before a command's first byte
-is skipped; it goes on streaming while it calibrates.
+The sources leave two things open. Here, bytes before a command's first byte are
+skipped, and the robot continues to stream while it calibrates.
 
 Source: GCtronic's wiki, "e-puck2 PC side development"; `socket_e-puck2.c`,
 `uart_e-puck2.c`.
@@ -31,14 +31,14 @@ from epuck_mj.constants import (
 )
 
 TIMER = MotorTimer(STEP_RATE_MAX, MOTOR_TICK_RATE_2, saves_current=False)
-"""Motors behind a radio that accepts less than the main processor does."""
+"""Timing of motors behind a radio that accepts lower speeds only."""
 
 
 class WifiFirmware(Talker):
-    """An e-puck2's radio and main processor, from the power switch on."""
+    """An e-puck2's radio and main processor, from the moment it is switched on."""
 
     def __init__(self, body: Body, now: float) -> None:
-        """Switch it on.
+        """Switch the robot on.
 
         Args:
             body: what it moves and senses with.

@@ -1,4 +1,4 @@
-"""What lies between a host and its robot: a UART's pace, latency, lost bytes."""
+"""The wire between a host and its robot: a UART's pace, latency, lost bytes."""
 
 from collections import deque
 
@@ -8,7 +8,7 @@ from epuck_mj.constants import BYTE_TIME
 
 
 class Wire:
-    """One direction of a serial line. It keeps bytes in order.
+    """One direction of a serial line, which keeps bytes in order.
 
     Attributes:
         loss: probability that a byte is lost; may be changed.
@@ -17,7 +17,7 @@ class Wire:
     def __init__(
         self, latency: float, loss: float, seed: int, byte_time: float = BYTE_TIME
     ) -> None:
-        """An idle line.
+        """Start with an idle line.
 
         Args:
             latency: added to the time that a byte takes on the UART [s].

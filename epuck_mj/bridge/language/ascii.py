@@ -1,8 +1,8 @@
 r"""The e-puck's ASCII dialect: a letter and operands, ended by one `\r`.
 
 The reply is a line: the letter in lower case, values, `\r\n`. It is recognised by its
-letter, the number of its values and their ranges, wherever it ends a line, so that
-half a line before it does no harm. A bare acknowledgement is a line of its own.
+letter, the number of its values and their ranges, at the end of any line, so that
+an incomplete line before it does no harm. An acknowledgement is a whole line.
 
 Not recognisable: a digit lost or changed, and a reply to an earlier, equal request.
 
@@ -62,7 +62,7 @@ def stop_order() -> Request[Acknowledged]:
 def calibration_order() -> Request[Acknowledged]:
     """K: the sensors' offsets are measured anew; nothing may be in their range.
 
-    The robot serves nobody meanwhile, and its motors go on.
+    Meanwhile the robot handles no commands, and its motors continue.
     """
     lines = (
         Line(re.compile(rb"k, Starting calibration[ -~]*\r\Z"), None, "'k, Starting'"),

@@ -10,8 +10,8 @@ length or checksum. What can be told of them:
 - `echoed_cycle_packet` ends in the commanded speeds, which we know: if a byte was lost
   and another one slipped in, or the robot was reset, they are not where they should be.
 
-Not recognisable: a byte changed into another within its range. So nothing may be under
-way when a packet is sent: see `protocol.RESYNC`.
+Not recognisable: a byte that was changed into another one within its range. So no bytes
+may be under way when a packet is sent: see `protocol.RESYNC`.
 
 Source: gctronic/e-puck-library, `Asercom.c` and `BTcom.c`.
 """

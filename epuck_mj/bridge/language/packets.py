@@ -35,7 +35,7 @@ BODY_BYTES = {IMAGE: 160 * 120 * 2, SENSORS: 104, EMPTY: 0}
 """Bytes of a packet after its kind."""
 
 AT_PROXIMITY, AT_AMBIENT, AT_STEPS, AT_SELECTOR = 37, 53, 79, 89
-"""Where things are in a sensor packet, its kind not counted."""
+"""Offsets in a sensor packet, without its first byte, the kind."""
 
 UNSIGNED_COUNTS = struct.Struct(f"<{N_PROXIMITY}H")
 
@@ -60,14 +60,14 @@ def wifi_command(left: int, right: int, calibrate: bool = False) -> bytes:
 
 
 class PacketParser:
-    """Cuts what comes from an e-puck2 into packets; good for one connection."""
+    """Parser that cuts the bytes of one connection to an e-puck2 into packets."""
 
     def __init__(self) -> None:
-        """A parser to which nothing came yet."""
+        """Start without bytes."""
         self._buffer = b""
 
     def feed(self, data: bytes) -> list[Sensors]:
-        """The sensor packets that are complete now, oldest first; images are skipped.
+        """Add bytes; the completed sensor packets, oldest first, without images.
 
         Args:
             data: what came, any number of bytes.
@@ -91,7 +91,7 @@ class PacketParser:
 
 
 def sensors_in(body: bytes) -> Sensors:
-    """What the bridge reads of a sensor packet.
+    """Values of a sensor packet that the bridge uses.
 
     Args:
         body: its 104 bytes.

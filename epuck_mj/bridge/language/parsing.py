@@ -1,4 +1,4 @@
-"""Requests, and the parsers that find their replies in whatever comes.
+"""Requests, and the parsers that find their replies in the bytes that come.
 
 A request is data: bytes to send, a fresh parser for the reply, and how long the reply
 may take. A parser is fed as bytes come in, in pieces of any size; it returns the reply,
@@ -16,24 +16,24 @@ from epuck_mj.constants import REPLY_TIME_MAX
 T = TypeVar("T")
 
 BANNER = b"WELCOME to the SerCom protocol on e-Puck"
-"""What a robot says after a reset, and never else.
+"""Text that a robot sends after a reset only.
 
 Source: e-puck-library, `Asercom.c`, `BTcom.c`.
 """
 
 NOT_FOUND = b"z,Command not found"
-"""What a robot says to what it doesn't understand.
+"""Text that a robot sends for a command it does not understand.
 
 Source: e-puck-library, `Asercom.c`, `BTcom.c`.
 """
 
 LINE_MAX = 256
-"""A line longer than this many bytes is none: every reply is shorter."""
+"""Longest line [bytes]: every reply is shorter."""
 
 
 @dataclass(frozen=True)
 class Request(Generic[T]):
-    """Something to ask of the robot. One at a time: the robot has room for no more.
+    """A request to the robot, which can keep only one at a time.
 
     Attributes:
         name: what it is, for a person.
@@ -65,7 +65,7 @@ class Line:
 
 
 class LinesParser(Generic[T]):
-    """Parser of one ASCII reply: certain lines, one after the other.
+    """Parser of one ASCII reply of given lines in a given order.
 
     Any other line is not ours and is skipped: garbage, banners' second halves, replies
     to what was given up. A line that begins as ours and is wrong raises.
@@ -74,7 +74,7 @@ class LinesParser(Generic[T]):
     def __init__(
         self, lines: tuple[Line, ...], reply: Callable[[list[bytes]], T]
     ) -> None:
-        """Parse lines to come, and make a reply of them.
+        """Expect these lines and make a reply of them.
 
         Args:
             lines: in the order in which they come.
@@ -87,11 +87,11 @@ class LinesParser(Generic[T]):
 
     @property
     def rest(self) -> bytes:
-        """What came after the reply's last line."""
+        """Bytes that came after the reply's last line."""
         return self._buffer if not self._awaited else b""
 
     def feed(self, data: bytes) -> T | None:
-        """The reply once it is complete, else None.
+        """Add bytes; the reply once it is complete, else None.
 
         Args:
             data: what came, any number of bytes.
@@ -133,13 +133,13 @@ class LinesParser(Generic[T]):
 
 
 class BytesParser(Generic[T]):
-    """Parser of one binary reply: so many bytes, and not one more.
+    """Parser of one binary reply with a fixed number of bytes.
 
-    They bear no mark. Whoever asks makes sure that nothing else is under way.
+    The bytes bear no mark. The caller makes sure that no other reply is under way.
     """
 
     def __init__(self, what: str, length: int, reply: Callable[[bytes], T]) -> None:
-        """Parse a number of bytes, and make a reply of them.
+        """Expect a number of bytes and make a reply of them.
 
         Args:
             what: the reply, for a person.
@@ -154,7 +154,7 @@ class BytesParser(Generic[T]):
 
     @property
     def rest(self) -> bytes:
-        """No bytes, ever: those after the reply raise."""
+        """Always empty: bytes after the reply raise."""
         return b""
 
     def feed(self, data: bytes) -> T | None:

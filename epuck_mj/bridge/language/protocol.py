@@ -1,13 +1,13 @@
-"""The robot's language, complete: what a link needs to know. Bytes only, no I/O.
+"""The robot's language as a link needs it: bytes only, no I/O.
 
-A link does this, and this only:
+A link works as follows:
 
 1. one request at a time: send `request.out`, feed whatever comes to one
    `request.parser()`, for `request.patience` seconds;
 2. a reply: done. What is left over then, in `parser.rest` or in the port, is dropped
    before the next request if that one is ASCII; if it is binary, go to step 3;
 3. no reply in time, or BridgeError: the two are out of step; go through `RESYNC`,
-   then send the speeds again: nobody knows which speeds the robot has made of it;
+   then send the speeds again, since it is unknown which speeds arrived;
 4. RobotRestarted, or `greets` of what was dropped: the robot stands still and has lost
    its calibration.
 
@@ -15,7 +15,7 @@ An e-puck2 on a serial line speaks the same `ascii` and `binary`; over WiFi it s
 `packets`. No firmware stops when the link is lost: send `ascii.stop_order()` on every
 way out.
 
-A reply cannot name its request. That none is misread as another rests on this:
+A reply does not name its request. These rules keep one from being taken for another:
 
 - ASCII: letter, number of values, ranges. Two replies to equal requests look the same,
   so a request that was given up is followed by RESYNC, never by itself.
@@ -35,7 +35,7 @@ from epuck_mj.constants import OPERANDS_MAX, RESYNC_QUIET
 
 @dataclass(frozen=True)
 class Resync:
-    """How host and robot find each other again.
+    """Recipe by which host and robot synchronise again.
 
     Send `flush`; drop what comes until nothing came for `quiet` seconds; ask `barrier`.
     If its reply does not come, or not alone, do it again: what was left in the robot
@@ -58,7 +58,7 @@ RESYNC = Resync(
     quiet=RESYNC_QUIET,
     barrier=ascii.version_query(),
 )
-"""The recipe for a serial line.
+"""Recipe by which host and robot synchronise on a serial line.
 
 Zeros are ignored between commands. The single return is followed by ASCII only: a
 binary command right after it would be taken for a line. Whatever the zeros completed
@@ -69,5 +69,5 @@ Source: gctronic/e-puck-library, `Asercom.c` (inferred from reading it, not trie
 
 
 def greets(data: bytes) -> bool:
-    """Whether the robot was reset while this came."""
+    """Whether these bytes hold the banner of a robot that was reset."""
     return BANNER in data

@@ -1,4 +1,4 @@
-"""What an e-puck answers, whichever dialect it was asked in."""
+"""Replies of an e-puck, in every dialect."""
 
 from dataclasses import dataclass
 
@@ -8,12 +8,12 @@ from epuck_mj.constants import N_PROXIMITY, N_SELECTOR, PROXIMITY_COUNT_MAX
 
 @dataclass(frozen=True)
 class Acknowledged:
-    """The robot has done what it was told."""
+    """Reply that the robot has carried out a command."""
 
 
 @dataclass(frozen=True)
 class Version:
-    """Which firmware answers.
+    """Firmware version of the robot.
 
     Attributes:
         lines: the firmware's line and, if the robot has one, the hardware's.
@@ -24,7 +24,7 @@ class Version:
 
 @dataclass(frozen=True)
 class Battery:
-    """What the robot says of its battery.
+    """State of the robot's battery.
 
     Attributes:
         state: `1` if it is good and `0` if it is low; of some, a raw value and per
@@ -34,7 +34,7 @@ class Battery:
     state: str
 
     def __str__(self) -> str:
-        """The state in words for a person."""
+        """The battery's state in words."""
         return {"0": "low", "1": "good"}.get(self.state, self.state)
 
 
@@ -68,7 +68,7 @@ class Steps:
 
 @dataclass(frozen=True)
 class Cycle:
-    """What a control step needs to know of the robot.
+    """Counts and step counters of a control step.
 
     Attributes:
         proximity: the proximity counts.
@@ -81,7 +81,7 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Sensors:
-    """What the bridge reads of an e-puck2's sensor packet.
+    """Values of an e-puck2's sensor packet that the bridge uses.
 
     Attributes:
         proximity: the proximity counts.

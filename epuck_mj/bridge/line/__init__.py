@@ -1,6 +1,6 @@
-"""The cable: serial ports, WiFi, connections, who stops a lost robot.
+"""The line to a robot: serial ports, WiFi, connections, and the guardian.
 
-`serial_port` is a port, the only `import serial`; `link` a conversation on it;
-`serial_line` and `wifi_line` offer what `interfaces` asks of a connection; `guardian`
-stops the robot of a bridge that was killed.
+`serial_port` is a port of pyserial, which only this module imports. `link` sends
+requests and receives replies on a port. `serial_line` and `wifi_line` are connections
+as in `interfaces`. `guardian` stops the robot of a bridge that was killed.
 """

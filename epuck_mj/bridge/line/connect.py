@@ -1,4 +1,4 @@
-"""A connection by the port's name: over a serial line, or to an e-puck2 over WiFi."""
+"""Connecting to a robot by the port's name: a serial line, or WiFi of an e-puck2."""
 
 from urllib.parse import urlsplit
 
@@ -14,7 +14,7 @@ from epuck_mj.constants import WIFI_PORT
 from epuck_mj.errors import UserError
 
 WIFI_SCHEME = "tcp://"
-"""What the name of a WiFi robot begins with."""
+"""Beginning of the port name of a robot on WiFi."""
 
 
 def connect(port: str) -> Connection:

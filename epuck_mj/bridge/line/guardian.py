@@ -1,10 +1,10 @@
-"""A process that outlives a bridge which was killed, to stop its robot.
+"""Guardian: a process that stops the robot if the bridge is killed.
 
-It shares the bridge's open port and says nothing, until the pipe from the bridge ends.
-If a byte came before that, the bridge is done; if not, it died, by `kill -9` or a
-crash: then the guardian sends what stops the robot, several times.
+It shares the bridge's open port and waits until the pipe from the bridge ends. If a
+byte came before that, the bridge has ended in order. If not, the bridge was killed or
+has crashed, and the guardian sends the stop message several times.
 
-Run by its path, with nothing but the standard library: it has to be there at once.
+It is run by its path and uses only the standard library, to start at once.
 """
 
 import contextlib
@@ -17,17 +17,17 @@ import time
 from collections.abc import Callable
 
 N_FAREWELLS, FAREWELL_PERIOD = 5, 0.2
-"""Farewells said, and the time between two [s]: bytes may be lost."""
+"""Number of stop messages and the time between two [s]: bytes may be lost."""
 
 DISMISSED = b"."
-"""What a bridge says that needs no guardian any more."""
+"""Message of a bridge that needs no guardian any more."""
 
 DISMISSAL_TIME_MAX = 2.0
-"""A dismissed guardian that takes longer to go is killed [s]. Chosen."""
+"""Time after which a dismissed guardian is killed [s]. Chosen."""
 
 
 def hire(fileno: Callable[[], int], farewell: bytes) -> subprocess.Popen | None:
-    """A guardian; None if there is nothing to say, or no descriptor to share.
+    """Start a guardian; None without a stop message or a descriptor to share.
 
     Windows has none, nor have ports that are no files.
 
@@ -51,7 +51,7 @@ def hire(fileno: Callable[[], int], farewell: bytes) -> subprocess.Popen | None:
 
 
 def dismiss(process: subprocess.Popen | None) -> None:
-    """Let a guardian go; it lets go of the port."""
+    """End a guardian, which closes the port."""
     if process is None or process.returncode is not None:
         return
     try:
@@ -62,7 +62,7 @@ def dismiss(process: subprocess.Popen | None) -> None:
 
 
 def guard(pipe: int, port: int, farewell: bytes) -> bool:
-    """Wait for the bridge's end; whether it needed us.
+    """Wait for the bridge's end and stop the robot; whether that was needed.
 
     Args:
         pipe: file descriptor that ends with the bridge.

@@ -1,4 +1,4 @@
-"""What a bridge asks of a port and of a robot, whichever they are."""
+"""Interfaces of a port and of a connection to a robot."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -7,24 +7,24 @@ from epuck_mj.bridge.language.replies import Cycle
 
 
 class Port(Protocol):
-    """Where bytes go in and out."""
+    """A port that sends and receives bytes."""
 
     def send(self, data: bytes) -> None:
-        """Send it all, or raise LinkLost."""
+        """Send all bytes, or raise LinkLost."""
         ...
 
     def receive(self, timeout: float) -> bytes:
-        """What came, at the latest after `timeout` seconds; LinkLost if it is gone."""
+        """The bytes that came within `timeout` seconds; LinkLost if it is gone."""
         ...
 
     def close(self) -> None:
-        """Let go of it, whatever its state."""
+        """Close the port, in any state."""
         ...
 
 
 @dataclass(frozen=True)
 class Greeting:
-    """Who answered.
+    """Version and battery of the robot that answered.
 
     Attributes:
         firmware: its version, and the hardware's if it says so.
@@ -36,7 +36,7 @@ class Greeting:
 
 
 class Connection(Protocol):
-    """A way to a robot. All of it raises BridgeError if the robot does not comply.
+    """A connection to a robot, which raises BridgeError if the robot does not comply.
 
     Attributes:
         n_repairs: how often host and robot had to find each other again.
@@ -45,11 +45,11 @@ class Connection(Protocol):
     n_repairs: int
 
     def greet(self) -> Greeting:
-        """Who is there; its motors stand still."""
+        """Greet the robot and stop its motors."""
         ...
 
     def cycle(self, left: int, right: int, changed: bool, until: float) -> Cycle:
-        """What it senses now.
+        """Command speeds; what the robot senses now.
 
         Args:
             left: speed [steps/s] of the left wheel, new if it `changed`.
@@ -60,11 +60,11 @@ class Connection(Protocol):
         ...
 
     def calibrate(self) -> None:
-        """Its sensors read zero for what they see now."""
+        """Set the sensors' zero to what they see now."""
         ...
 
     def stop(self) -> None:
-        """It stands still and said so; a lost port is opened again.
+        """Stop the robot until it confirms; a lost port is opened again.
 
         Raises:
             StillMoving: if it did not say so in bounded time.
@@ -72,5 +72,5 @@ class Connection(Protocol):
         ...
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the connection."""
         ...

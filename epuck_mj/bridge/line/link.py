@@ -19,7 +19,7 @@ REOPEN_PERIOD = 0.1
 """Time between two attempts to open a lost port [s]. Chosen."""
 
 DROPPED_MAX = 1024
-"""Bytes kept of what is dropped: enough to see a banner in."""
+"""Number of dropped bytes that are kept: enough to see a banner."""
 
 
 class Link:
@@ -59,11 +59,11 @@ class Link:
         return self._port.lost
 
     def close(self) -> None:
-        """Let go of the port."""
+        """Close the port."""
         self._port.close()
 
     def reopen(self, until: float) -> None:
-        """Open the lost port as soon as it is there again.
+        """Open the lost port again as soon as it exists.
 
         Args:
             until: when to give up, by the clock.
@@ -83,7 +83,7 @@ class Link:
             self._sleep(REOPEN_PERIOD)
 
     def ask(self, request: Request[T], until: float = float("inf")) -> T:
-        """The reply to a request.
+        """Send a request; its reply.
 
         Args:
             request: what to ask.
@@ -128,7 +128,7 @@ class Link:
         raise NoReply(f"a reply to {request.name} in time", self._rest or "nothing")
 
     def resync(self, until: float) -> bool:
-        """Find each other again; what the robot had heard of has been carried out.
+        """Synchronise with the robot; requests that it had received are carried out.
 
         Args:
             until: when to give up, by the clock.
@@ -137,7 +137,7 @@ class Link:
             Whether the robot's banner came: it was reset.
 
         Raises:
-            BridgeError: if there is nobody who answers as an e-puck.
+            BridgeError: if no e-puck answers.
             LinkLost: if the port is gone.
         """
         restarted, came = False, b""
@@ -166,7 +166,7 @@ class Link:
                 self._unanswered = True
 
     def drain(self, until: float) -> bytes:
-        """What comes before nothing has come for a while, or until then.
+        """Drop bytes until none has come for a while, or until a time; the bytes.
 
         Raises:
             LinkLost: if the port is gone.
@@ -181,7 +181,7 @@ class Link:
         return came
 
     def flush(self) -> None:
-        """End whatever the robot waits for; to be followed by ASCII.
+        """End any command that the robot waits to complete; ASCII follows.
 
         Raises:
             LinkLost: if the port is gone.

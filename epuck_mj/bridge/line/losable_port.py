@@ -1,4 +1,4 @@
-"""A port that may be lost at any time, and opened again."""
+"""Ports that may be lost at any time and opened again."""
 
 from collections.abc import Callable
 
@@ -10,7 +10,7 @@ class LosablePort:
     """A port that is closed as soon as it is lost; see `interfaces.Port`."""
 
     def __init__(self, open_port: Callable[[], Port]) -> None:
-        """Open it by `open_port`, each time anew.
+        """Open the port by `open_port`, which is called again after each loss.
 
         Raises:
             UserError: if that is not possible.
@@ -20,11 +20,11 @@ class LosablePort:
 
     @property
     def lost(self) -> bool:
-        """Whether it has to be opened again."""
+        """Whether the port has to be opened again."""
         return self._port is None
 
     def reopen(self) -> None:
-        """Open it, closing what is left of the one before.
+        """Close what is left of the lost port and open it again.
 
         Raises:
             UserError: if that is not possible.

@@ -1,4 +1,4 @@
-"""A robot on a serial line: an e-puck v1 over Bluetooth, an e-puck2 over either."""
+"""A robot on a serial line: e-puck v1 over Bluetooth, e-puck2 over Bluetooth or USB."""
 
 from epuck_mj.bridge.failures import BridgeError, LinkLost, RobotRestarted, StillMoving
 from epuck_mj.bridge.language import ascii, binary
@@ -16,7 +16,7 @@ class SerialLine:
     """
 
     def __init__(self, link: Link) -> None:
-        """Take a link that is open."""
+        """Use an open link."""
         self._link = link
         self._busy_until = 0.0
         self.n_repairs = 0
@@ -31,7 +31,7 @@ class SerialLine:
         except LinkLost:
             raise
         except BridgeError:
-            # half a word of whoever was there before
+            # an incomplete command of an earlier connection
             pass
         self._link.resync(until)
         self._link.ask(ascii.stop_order(), until)
@@ -47,7 +47,7 @@ class SerialLine:
         return Greeting(", ".join(version.lines), battery)
 
     def cycle(self, left: int, right: int, changed: bool, until: float) -> Cycle:
-        """See Connection; while out of step, host and robot find each other again.
+        """See Connection; synchronises again if host and robot are out of step.
 
         Raises:
             BridgeError: if they did not; names what was wrong first.
@@ -61,7 +61,7 @@ class SerialLine:
                     self.n_repairs += 1
                     if self._link.resync(until):
                         raise RobotRestarted("a robot that goes on", "its banner")
-                    # nobody knows what it has made of the last speeds
+                    # it is unknown whether the last speeds arrived
                     changed = True
                 return self._link.ask(
                     binary.echoed_cycle_packet(left, right, changed), until
@@ -83,7 +83,7 @@ class SerialLine:
     def stop(self) -> None:
         """See Connection."""
         now = self._link.clock()
-        # while it calibrates it hears nobody
+        # while it calibrates it handles no commands
         until = max(now, self._busy_until) + STOP_TIME_MAX
         problem: BridgeError | None = None
         while problem is None or self._link.clock() < until:

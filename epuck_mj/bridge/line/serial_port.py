@@ -1,4 +1,4 @@
-"""Ports of pyserial, which may fail at any time. The only `import serial`."""
+"""Ports of pyserial, which may fail at any time."""
 
 import errno
 
@@ -11,20 +11,20 @@ from epuck_mj.constants import BAUD_RATE
 from epuck_mj.errors import UserError
 
 POLL_TIME = 0.01
-"""How long one look at a port waits for its first byte [s]."""
+"""How long one read of a port waits for its first byte [s]."""
 
 WRITE_TIME_MAX = 0.5
-"""A port that takes no bytes for this long is lost [s]. Chosen."""
+"""Time without accepting bytes after which a port is lost [s]. Chosen."""
 
 READ_MAX = 4096
-"""Most bytes read at once."""
+"""Largest number of bytes read at once."""
 
 
 class SerialPort:
     """A port of pyserial: `/dev/rfcomm0`, `COM5` or `socket://host:port`."""
 
     def __init__(self, name: str, farewell: bytes = b"") -> None:
-        """Open it; nobody else may have it.
+        """Open the port for this process only.
 
         Args:
             name: of the port.
@@ -96,7 +96,7 @@ def ports() -> list[tuple[str, str]]:
 
 
 def _why(name: str, error: Exception) -> str:
-    """One line on why a port cannot be opened."""
+    """Why a port cannot be opened, on one line."""
     # pyserial wraps most errors, sometimes in the text only
     number = getattr(error, "errno", None)
     reason = _one_line(error)

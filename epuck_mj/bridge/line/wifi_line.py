@@ -1,7 +1,7 @@
-"""An e-puck2 on the air: commands out, packets in without end, nothing acknowledged.
+"""An e-puck2 on WiFi: commands go out, packets stream in, none are acknowledged.
 
-What it senses now is in the first packet that comes after one asks; packets that came
-before are old and dropped. That it stopped is seen by its step counters.
+The current reading is in the first packet that comes after it is asked for; earlier
+packets are dropped. Whether the robot has stopped is seen from its step counters.
 """
 
 import time
@@ -22,7 +22,7 @@ from epuck_mj.constants import (
 from epuck_mj.errors import UserError
 
 STANDING_TIME = 0.1
-"""Counters that stay as they are for this long belong to a robot at rest [s]. Chosen.
+"""Time without a change of counters after which a robot is at rest [s]. Chosen.
 
 A wheel slower than 10 steps/s, 1.3 mm/s, is not noticed.
 """
@@ -51,7 +51,7 @@ class WifiLine:
             sleep: lets so many seconds go by.
 
         Raises:
-            UserError: if nobody is there.
+            UserError: if there is no robot.
         """
         self._clock = clock
         self._sleep = sleep
@@ -81,7 +81,7 @@ class WifiLine:
         return Cycle(sensors.proximity, sensors.steps)
 
     def calibrate(self) -> None:
-        """See Connection; nobody says when it is done, so all its time goes by."""
+        """See Connection; always waits the whole time, as the end is not reported."""
         self._port.send(wifi_command(0, 0, calibrate=True))
         self._port.send(wifi_command(0, 0))
         end = self._clock() + CALIBRATION_TIME_MAX
@@ -111,7 +111,7 @@ class WifiLine:
         self._port.close()
 
     def _rests(self) -> bool:
-        """Whether it stands after it was told to."""
+        """Whether the robot stands still after it was told to."""
         self._port.send(wifi_command(0, 0))
         self._drop()
         # commands wait for their turn: what it does now says nothing yet
@@ -126,12 +126,12 @@ class WifiLine:
         return True
 
     def _drop(self) -> None:
-        """Forget the packets that are here, but keep in step with half ones."""
+        """Drop the packets that have come, but keep incomplete ones."""
         while data := self._port.receive(0.0):
             self._parser.feed(data)
 
     def _next(self, until: float) -> Sensors:
-        """The latest of the packets that come next."""
+        """Wait for packets; the latest of them."""
         while (now := self._clock()) < until:
             found = self._parser.feed(self._port.receive(until - now))
             if found:

@@ -1,4 +1,4 @@
-"""Rerun recordings: trials to watch. Only this package imports rerun.
+"""Rerun recordings of trials. Only this package imports rerun.
 
 One .rrd, blueprint inside: the arena in 3D with every trial's robot, the path that
 grows and the eight proximity rays, beside plots of everything the trajectories hold.
@@ -58,7 +58,7 @@ def save_recording(
         summary: Markdown for the text panel.
 
     Raises:
-        UserError: if it cannot be written, or nobody can measure clearance here.
+        UserError: if it cannot be written, or clearance cannot be measured here.
     """
     probe = ClearanceProbe(scene, 1)
     places = entities([trial.name for trial in trials])
@@ -81,13 +81,13 @@ def save_recording(
         content = file.read_bytes() if file.exists() else b""
     # rerun only warns when it is switched off
     if not content:
-        raise UserError(f"cannot write '{path}': rerun is off, see RERUN")
+        raise UserError(f"cannot write '{path}': the variable RERUN switches rerun off")
     with writing():
         write_bytes(Path(path), content)
 
 
 def _identity(trials: Sequence[Trial]) -> str:
-    """The same for the same trials, so that two files of them are one recording."""
+    """Identity of a recording, equal for equal trials."""
     digest = hashlib.sha256()
     for trial in trials:
         digest.update(trial.name.encode())

@@ -1,4 +1,4 @@
-"""How a recording is laid out in the viewer."""
+"""Layout of a recording in the viewer."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from epuck_mj.show.recording import Trial
 
 PLOTTED_CLEARANCE = 60.0
-"""Highest clearance that a plot shows at first [mm]: what following is about."""
+"""Highest clearance that a plot shows at first [mm]."""
 
 PLOTTED_COUNTS = 4096
 """End of the proximity plot: the sensors' converters have 12 bits."""
@@ -52,7 +52,7 @@ def blueprint(
 
 
 def arena_view(scene: Scene, growing: Sequence[str] = ()) -> rrb.Spatial3DView:
-    """The arena with all that is in it, from above.
+    """View of the arena from above.
 
     Args:
         scene: its model.
@@ -79,7 +79,7 @@ def arena_view(scene: Scene, growing: Sequence[str] = ()) -> rrb.Spatial3DView:
 def _tabs(
     scene: Scene, trial: "Trial", place: Entities, network: bool
 ) -> list[rrb.Container]:
-    """The plots of one trial: what it is worth, and what its robot is made of."""
+    """Tabs with the plots of one trial: fitness, sensors, network and wheels."""
     steps = trial.trajectory.steps
     fastest = scene.model.actuator_ctrlrange[scene.wheels].max()
     plots = [
@@ -101,7 +101,7 @@ def _tabs(
 
 
 def _comparison(trials: Sequence["Trial"], places: Sequence[Entities]) -> rrb.Container:
-    """The plots that all trials share."""
+    """Tabs with the plots that all trials share."""
     steps = max(trial.trajectory.steps for trial in trials)
     return rrb.Vertical(*_shared(places, steps), name="Comparison")
 

@@ -1,4 +1,4 @@
-"""Where things are logged: the names that recordings of all trials share."""
+"""Names under which recordings log things."""
 
 import re
 from collections.abc import Sequence
@@ -15,12 +15,12 @@ ARENA = "arena"
 TIMELINE = "sim_time"
 
 SENSED, DECIDED, EARNED = slice(None), slice(None, -1), slice(1, None)
-"""Rows of a trajectory at which there is what is sensed, decided and earned."""
+"""Rows of a trajectory with sensed, decided and earned values."""
 
 
 @dataclass(frozen=True)
 class Entities:
-    """Of one trial.
+    """Names of the entities of one trial.
 
     Attributes:
         name: what a person calls the trial.
@@ -36,35 +36,35 @@ class Entities:
 
     @property
     def path(self) -> str:
-        """Where the robot has been."""
+        """Name of the robot's path."""
         return f"{self.root}/path"
 
     @property
     def rays(self) -> str:
-        """What its proximity sensors look along."""
+        """Name of the proximity sensors' rays."""
         return f"{self.root}/rays"
 
     @property
     def crash(self) -> str:
-        """Where it crashed."""
+        """Name of the mark of a crash."""
         return f"{self.root}/crash"
 
     @property
     def phase(self) -> str:
-        """What it is about."""
+        """Name of the robot's phase."""
         return f"{self.root}/phase"
 
     def signal(self, name: str) -> str:
-        """What has no place in space."""
+        """Name of a plotted signal."""
         return f"{self.root}/signals/{name}"
 
     def body(self, name: str) -> str:
-        """A part that moves."""
+        """Name of a moving body."""
         return f"{self.root}/robot/{name}"
 
 
 def entities(names: Sequence[str]) -> list[Entities]:
-    """A place for each trial; equal names are kept apart."""
+    """Entities of each trial, numbered where trials have equal names."""
     roots: list[str] = []
     for name in names:
         # a name of signs only still needs a place
@@ -79,7 +79,7 @@ def entities(names: Sequence[str]) -> list[Entities]:
 
 
 def columns(trajectory: Trajectory, rows: slice | np.ndarray) -> list[rr.TimeColumn]:
-    """Both timelines at those rows of what is sensed."""
+    """Columns of both timelines for these rows."""
     # rerun truncates seconds given as floats
     time = np.round(trajectory.time[rows] * 1e9).astype("timedelta64[ns]")
     step = np.arange(len(trajectory.time))[rows]

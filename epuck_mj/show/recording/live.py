@@ -1,4 +1,4 @@
-"""A run of evolution in a viewer while it goes on: curves, and the best one's trial.
+"""Live view of a run: curves, and a trial of the best individual.
 
 Everything is on the timelines `evaluations` and `generation`: moving the cursor back
 shows what the best individual did then.
@@ -30,7 +30,7 @@ PATIENCE = 2.0
 
 
 class LiveView:
-    """A stream to a viewer that is there."""
+    """A stream to a running viewer."""
 
     def __init__(self, address: str, scene: Scene, title: str, steps: int):
         """Connect, and show the arena.
@@ -63,7 +63,7 @@ class LiveView:
         fitness: np.ndarray,
         crash_rate: np.ndarray,
     ) -> None:
-        """Add to the curves.
+        """Add generations to the curves.
 
         Args:
             evaluations: spent by the end of each generation, `(n,)`.
@@ -84,7 +84,7 @@ class LiveView:
     def trial(
         self, evaluations: int, generation: int, trajectory: Trajectory, summary: str
     ) -> None:
-        """Show what the best individual does now.
+        """Show a trial of the best individual.
 
         Args:
             evaluations: spent so far.
@@ -128,7 +128,7 @@ class LiveView:
             raise ConnectionError(str(error)) from None
 
     def close(self) -> None:
-        """Let go of the viewer, which keeps what it has; this may wait for it."""
+        """Disconnect from the viewer, which keeps its data; may wait for the viewer."""
         self._stream.disconnect()
 
 

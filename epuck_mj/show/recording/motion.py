@@ -1,4 +1,4 @@
-"""What moves in the arena: the robot's bodies, its path, its rays, its crash."""
+"""Motion in the arena: the robot's bodies, path, rays and crash."""
 
 import numpy as np
 import rerun as rr
@@ -16,7 +16,7 @@ PATH_HEIGHT = 0.003
 """Height of the path above the robot's origin [m], to lie on the floor."""
 
 MARK_HEIGHT = 0.07
-"""Height of a crash's mark above it [m]."""
+"""Height of a crash's mark above the robot [m]."""
 
 
 def log_motion(

@@ -1,4 +1,4 @@
-"""Geoms of a compiled scene as rerun's shapes: what does not change."""
+"""Geoms of a compiled scene as shapes of rerun."""
 
 import mujoco
 import numpy as np
@@ -16,15 +16,15 @@ from epuck_mj.scene.robot_parts import ROBOT_BODY
 from epuck_mj.show.recording.entities import ARENA, Entities
 
 FLOOR_THICKNESS = 0.002
-"""Of planes, as drawn [m]."""
+"""Thickness of planes, as drawn [m]."""
 
 
 MARK_HEIGHT = 0.085
-"""Height above the robot of the mark that tells it from others [m]."""
+"""Height of a robot's coloured mark above the robot [m]."""
 
 
 def log_arena(stream: rr.RecordingStream, model: mujoco.MjModel) -> None:
-    """All that stands still, where it stands."""
+    """Log the geoms that stand still."""
     data = at_rest(model)
     for geom in _drawn(model, moving=False):
         quaternion = np.zeros(4)
@@ -35,7 +35,7 @@ def log_arena(stream: rr.RecordingStream, model: mujoco.MjModel) -> None:
 def log_robot(
     stream: rr.RecordingStream, model: mujoco.MjModel, place: Entities
 ) -> None:
-    """All that moves, in the frame of its body; with a mark if there are others."""
+    """Log the geoms that move, in their bodies' frames, with a mark if asked."""
     for geom in _drawn(model, moving=True):
         body = place.body(body_name(model, model.geom_bodyid[geom]))
         _log(stream, model, geom, body, model.geom_pos[geom], model.geom_quat[geom])
@@ -50,12 +50,12 @@ def log_robot(
 
 
 def body_name(model: mujoco.MjModel, body: int) -> str:
-    """Of a body that may have none in the model."""
+    """Name of a body, made up if the model has none."""
     return model.body(body).name or f"body{body}"
 
 
 def _drawn(model: mujoco.MjModel, moving: bool) -> list[int]:
-    """Geoms to be seen that move, or do not."""
+    """Visible geoms that move, or that do not."""
     moves = np.isin(model.geom_bodyid, moving_bodies(model))
     return np.flatnonzero(drawn(model) & (moves == moving)).tolist()
 

@@ -1,4 +1,4 @@
-"""What a trajectory says that has no place in space: plots, and the phase's lane."""
+"""Signals of a trajectory: plots, and the lane of phases."""
 
 from dataclasses import dataclass
 
@@ -105,7 +105,7 @@ def _log_phases(
     phase: np.ndarray,
     place: Entities,
 ) -> None:
-    """Each phase where it begins."""
+    """Log each phase at its beginning."""
     names = list(PHASE_COLORS)
     style = rr.StateConfiguration(
         values=names, labels=names, colors=list(PHASE_COLORS.values())

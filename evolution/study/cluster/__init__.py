@@ -1,9 +1,8 @@
-"""The runs of a study on a Dask cluster: workers elsewhere, the files here.
+"""Runs of a study on a Dask cluster, with their files on this machine.
 
-Whatever happens on the way, the bytes are those of a run on this machine, if the
-processors are of one type: a task whose worker dies is done again by another, and a
-worker of other versions, code or models refuses its tasks. Only this package imports
-`distributed`, an extra.
+If the processors are of one type, the bytes are those of a run on this machine: if a
+worker dies, another one repeats its task, and a worker with other versions, code or
+models refuses its tasks. Only this package imports `distributed`, an extra.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,7 +28,7 @@ __all__ = ["carry_out_on_cluster", "check_address"]
 def carry_out_on_cluster(
     jobs: Sequence[Job], address: str, split: bool, racing: bool
 ) -> Iterator[Event]:
-    """Do all jobs on a cluster; those under way are dropped with this generator.
+    """Do all jobs on a cluster; closing the generator drops unfinished jobs.
 
     Args:
         jobs: what to do.

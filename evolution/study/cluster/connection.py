@@ -1,4 +1,4 @@
-"""The connection to a cluster: tasks, answers, and no wait that could last forever."""
+"""Connection to a cluster: tasks and answers, with a limit to every wait."""
 
 import asyncio
 import logging
@@ -34,10 +34,10 @@ WORKERS_PATIENCE = 60.0
 """How long the scheduler may be without a worker [s]."""
 
 TRANSFER_PATIENCE = 60.0
-"""How long a result may take from a worker to here before it is asked for again [s]."""
+"""Time of a result's transfer after which it is asked for again [s]."""
 
 LOOK_AFTER = 2.0
-"""How long to wait for results before looking whether anybody is there [s]."""
+"""Time without results after which scheduler and workers are checked [s]."""
 
 LOGGERS = ("distributed", "distributed.client", "tornado", "tornado.application")
 
@@ -48,48 +48,48 @@ LOCAL_SETTINGS: dict[str, Any] = {
     "scheduler_kwargs": {"dashboard": False},
     "silence_logs": logging.CRITICAL,
 }
-"""Of a cluster on this machine: as bare as can be."""
+"""Settings of a cluster on this machine, without extras."""
 
 QUIET = {
     "distributed.nanny.pre-spawn-environ.DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": (
         "critical"
     )
 }
-"""Keeps the workers of such a cluster quiet from their first import on."""
+"""Environment that keeps workers on this machine quiet."""
 
 
 class ClusterLost(UserError):
-    """The cluster as a whole is of no more use; not the failure of one job."""
+    """The cluster as a whole has failed, not only one job."""
 
 
 def check_address(address: str) -> None:
-    """Refuse what is no address of a cluster.
+    """Refuse an invalid address of a cluster.
 
     Raises:
         UserError: saying what is.
     """
     if not REMOTE.fullmatch(address) and not LOCAL.fullmatch(address):
         raise UserError(
-            "expected as cluster tcp://host:8786, tls://host:8786 or, for workers on "
+            "expected --cluster tcp://host:8786, tls://host:8786 or, for workers on "
             f"this machine, local:4, got '{address}'"
         )
 
 
 class Cluster:
-    """Workers that can be given tasks; no call waits forever."""
+    """Workers that can be given tasks, with a limit to every wait."""
 
     def __init__(self, client: Client, address: str):
-        """Take a connected client; `address` is for messages."""
+        """Use a connected client; `address` is for messages."""
         # typed as if every call could be asynchronous
         self._client: Any = client
         self._address = address
         self._seen_workers = time.monotonic()
 
     def n_threads(self) -> int:
-        """Threads of all workers together; 0 for the moment, if there is no worker.
+        """Number of threads of all workers; 0 while there is no worker.
 
         Raises:
-            ClusterLost: if the moment has lasted too long, or nobody answers.
+            ClusterLost: if there was no worker for too long, or no scheduler answers.
         """
         if self._client.status != "running":
             raise self._lost()
@@ -107,10 +107,10 @@ class Cluster:
         return sum(threads.values())
 
     def submit(self, name: str, function: Callable, *args: Any) -> Future:
-        """A task for some worker, or for another one if that should die.
+        """Submit a task to a worker, or to another one if that dies.
 
         Raises:
-            ClusterLost: if there is nobody to take it.
+            ClusterLost: if the scheduler is lost.
         """
         if self._client.status != "running":
             raise self._lost()
@@ -119,7 +119,7 @@ class Cluster:
         return self._client.submit(function, *args, key=key, pure=False)
 
     def answers(self, futures: Collection[Future]) -> dict[Future, Any]:
-        """What those gave that have ended: a result, or the exception it ended with.
+        """Results or exceptions of the tasks that have ended.
 
         Waits until there is one, but no longer than a while.
 
@@ -138,12 +138,12 @@ class Cluster:
         except CancelledError:
             raise self._lost() from None
         except TimeoutError:
-            # whoever waits for nobody hears of it here
+            # raises if there is no worker any more
             self.n_threads()
         return answers
 
     def results(self, futures: Sequence[Future]) -> list[Any]:
-        """What all tasks gave, in their order.
+        """Results of all tasks, in their order.
 
         Raises:
             ClusterLost: as `n_threads`.
@@ -166,7 +166,7 @@ class Cluster:
 
 
 def _answer(future: Any) -> Any:
-    """What the task of an ended future gave, or the exception it ended with.
+    """Result of an ended future, or the exception that it ended with.
 
     Raises:
         TimeoutError: if it does not come.
@@ -188,7 +188,7 @@ def connected(address: str) -> Iterator[Cluster]:
     """The cluster at an address of `carry_out_on_cluster`.
 
     Raises:
-        UserError: if nobody answers there.
+        UserError: if no scheduler answers there.
     """
     # its news are for those who run the cluster; what concerns us is raised
     for name in LOGGERS:
@@ -208,7 +208,7 @@ def connected(address: str) -> Iterator[Cluster]:
 
 
 def _greet(address: str) -> None:
-    """Make sure of a scheduler: a client would wait for a mute one forever.
+    """Refuse an address without an answering scheduler.
 
     Raises:
         UserError: if there is none.
@@ -232,6 +232,6 @@ def _greet(address: str) -> None:
 
 
 def _close(client: Client) -> None:
-    """Leave; the scheduler drops every task that nobody else waits for."""
+    """Disconnect; the scheduler drops this client's tasks."""
     with suppress(TimeoutError):
         client.close(SCHEDULER_PATIENCE)

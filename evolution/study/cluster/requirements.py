@@ -1,4 +1,4 @@
-"""What has to be the same on a worker as here, or its bits would be others."""
+"""Requirements on workers, so that they give the same bits as this machine."""
 
 import hashlib
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.settings.config import ExperimentConfig
 
 DECIDING = ("epuck-mj", "mujoco", "numpy", "scipy", "contourpy", "cmaes")
-"""Packages whose version decides over the bits."""
+"""Packages whose versions change the bits of results."""
 
 
 @dataclass(frozen=True)
 class Requirements:
-    """What decides over the bits of a trial, but for controller, start and task.
+    """What the bits of a trial depend on besides controller, start and task.
 
     Attributes:
         robot: shipped robot, or the path of an MJCF file.
@@ -43,7 +43,7 @@ class Requirements:
     def here(
         cls, robot: str, arena: str, control_step: float, own: tuple[str, ...] = ()
     ) -> Self:
-        """As it is on this machine.
+        """The requirements as met by this machine.
 
         Raises:
             UserError: if robot or arena cannot be used, or an own part not be loaded.
@@ -59,7 +59,7 @@ class Requirements:
         return cls(robot, arena, control_step, own, tuple(facts.items()))
 
     def refuse_another(self) -> None:
-        """On a worker: refuse to give other bits than the machine that asks would get.
+        """On a worker: refuse work whose results would differ from the client's.
 
         Raises:
             UserError: naming what differs.
@@ -80,7 +80,7 @@ class Requirements:
 
 @cache
 def code() -> str:
-    """First digits of a hash of this project's Python, of which no version tells."""
+    """First digits of a hash of this project's Python files."""
     digest = hashlib.sha256()
     for package in (epuck_mj, evolution):
         root = Path(str(package.__file__)).parent
@@ -91,7 +91,7 @@ def code() -> str:
 
 
 def requirements_of(config: ExperimentConfig) -> Requirements:
-    """What a run requires, as it is on this machine.
+    """The requirements of a run, as met by this machine.
 
     Raises:
         UserError: if robot or arena cannot be used.

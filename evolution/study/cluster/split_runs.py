@@ -1,4 +1,4 @@
-"""Split runs: evolution goes on here, one run at a time; trials are lived elsewhere."""
+"""Split runs: one run at a time here, with its trials simulated on workers."""
 
 import math
 import threading
@@ -15,14 +15,14 @@ from evolution.study.cluster.requirements import Requirements, requirements_of
 from evolution.study.jobs import Event, Job, failure_log, failure_of, generations
 
 CHUNKS_PER_THREAD = 2
-"""Parts of a generation for each thread: more even out, fewer cost less to send."""
+"""Parts of a generation per thread: more balance the load, fewer cost less to send."""
 
 ENGINES_KEPT = 4
-"""Engines that a thread of a worker keeps for its next chunks."""
+"""Number of engines that a thread of a worker keeps."""
 
 
 def split_runs(jobs: Sequence[Job], cluster: Cluster, racing: bool) -> Iterator[Event]:
-    """One job after the other, each spread over all workers."""
+    """Do one job after the other, each spread over all workers."""
     for job in jobs:
         failure = None
         try:
@@ -39,10 +39,10 @@ def split_runs(jobs: Sequence[Job], cluster: Cluster, racing: bool) -> Iterator[
 
 
 class ClusterEngine:
-    """Trials in parts, wherever a thread is free; see `evaluation.Engine`."""
+    """Engine that runs parts of the trials on the threads of a cluster."""
 
     def __init__(self, cluster: Cluster, config: ExperimentConfig):
-        """Find out what has to be the same everywhere.
+        """Store the requirements on workers.
 
         Raises:
             UserError: if robot or arena cannot be used.
@@ -52,7 +52,7 @@ class ClusterEngine:
         self._task = config.task
 
     def __str__(self) -> str:
-        """Its name in a run's provenance."""
+        """Name of the engine in a run's provenance."""
         return "cluster"
 
     def run(self, work: Work) -> Trials:

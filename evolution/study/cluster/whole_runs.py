@@ -1,4 +1,4 @@
-"""Whole runs, one task each: workers hand back the files, and share nothing else."""
+"""Whole runs, one task each: workers return the files and share no file system."""
 
 import threading
 import time
@@ -27,7 +27,7 @@ from evolution.study.jobs import (
 
 
 def whole_runs(jobs: Sequence[Job], cluster: Cluster, racing: bool) -> Iterator[Event]:
-    """Each job as one task."""
+    """Do each job as one task."""
     waiting = deque(jobs)
     running: dict[Future, Job] = {}
     while waiting or running:
@@ -58,7 +58,7 @@ def whole_runs(jobs: Sequence[Job], cluster: Cluster, racing: bool) -> Iterator[
 
 
 def _sent(job: Job, cluster: Cluster, racing: bool) -> Future:
-    """The task that does a job, from wherever its directory stands.
+    """Submit a task that starts a job or continues it from its directory.
 
     Raises:
         UserError: if it cannot be begun.
@@ -81,7 +81,7 @@ def _sent(job: Job, cluster: Cluster, racing: bool) -> Future:
 
 
 def _refuse_foreign(directory: RunDirectory, job: Job) -> None:
-    """Refuse a directory in which a run on this machine could not go on.
+    """Refuse a directory that a run on this machine could not continue.
 
     Raises:
         UserError: if it holds something else.
@@ -95,7 +95,7 @@ def _refuse_foreign(directory: RunDirectory, job: Job) -> None:
 def _run(
     job: Job, begun: Mapping[str, bytes], racing: bool, required: Requirements
 ) -> dict[str, bytes]:
-    """On a worker: the files of a run, by name, from those `begun` on.
+    """On a worker: continue a run from the files `begun`; all its files by name.
 
     Raises:
         UserError: for anything the user can put right.
@@ -125,11 +125,11 @@ _running = threading.Lock()
 
 
 class _UnwantedError(Exception):
-    """Nobody waits for this task any more."""
+    """The client does not wait for this task any more."""
 
 
 def _stop_if_unwanted() -> None:
-    """On a worker: end a task that has been taken back, which Dask lets go on."""
+    """On a worker: end a task that was cancelled, which Dask would continue."""
     worker = get_worker()
     task = worker.state.tasks.get(worker.get_current_task())
     if task is None or task.state == "cancelled":
@@ -137,7 +137,7 @@ def _stop_if_unwanted() -> None:
 
 
 def _keep(job: Job, found: Mapping[str, bytes]) -> None:
-    """Write a run's files as the run itself would have left them.
+    """Write a run's files as the run itself would have written them.
 
     Raises:
         UserError: if they cannot be written.
@@ -148,7 +148,7 @@ def _keep(job: Job, found: Mapping[str, bytes]) -> None:
     last = directory.provenance.name
     middle = [name for name in found if name not in (*first, last)]
     with directory.locked(PATIENCE), files.writing():
-        # somebody else may have been there meanwhile
+        # another process may have been there meanwhile
         _refuse_foreign(directory, job)
         if not directory.finished:
             files.remove_leftovers(directory.path)
