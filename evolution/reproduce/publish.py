@@ -22,7 +22,7 @@ REPORTED = ("paper", "wheels")
 TRANSFER = "transfer"
 """The study of robots that differ; the gap measures it."""
 
-README_FILE = Path("README_FILE.md")
+README_FILE = Path("README.md")
 
 
 @dataclass(frozen=True)
