@@ -425,8 +425,8 @@ def test_report_of_a_partial_study(written, capsys):
     assert headings[:3] == ["What is missing", "What was run", "Held-out fitness"]
     assert "- ga: no finished run of seed 3" in text
     # held-out first, on wheels first, then what evolution believes
-    head = next(line for line in text.splitlines() if "| best run" in line)
-    order = [head.index(w) for w in ("wheeled robot", "planar robot", "stored")]
+    head = next(line for line in text.splitlines() if ": best run" in line)
+    order = [head.index(w) for w in ("wheeled robot", "planar robot", "best stored")]
     assert order == sorted(order)
     assert "no verdict" in text
     assert not re.search(r"significan|\\\*", text)

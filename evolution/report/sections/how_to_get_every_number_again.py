@@ -106,7 +106,7 @@ def how_to_get_every_number_again_section(
         blocks += [
             Paragraph("The experiments differ in these keys:"),
             Table(
-                ("key", *(label(name) for name in names)),
+                ("key", *(label(data, name) for name in names)),
                 [
                     (key, *(str(values.get(name, NOTHING)) for name in names))
                     for key, values in differing.items()
