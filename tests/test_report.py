@@ -105,15 +105,21 @@ def test_runs_read_back_exactly(study):
         run = next(
             r for r in study.runs[row["experiment"]] if r.seed == int(row["seed"])
         )
-        assert float(row["epuck mean"]) == run.held_out("epuck")
+        assert float(row["epuck_mean"]) == run.held_out("epuck")
         assert float(row["stored"]) == run.scores.stored
         assert int(row["evaluations"]) == 3000
         # a generation that was repeated after a crash counts once
         assert int(row["control_steps"]) == 1900
         assert Path(row["path"]) == run.path
     columns = list(rows[0])
-    assert columns.index("epuck mean") < columns.index("epuck_planar mean")
-    assert columns.index("epuck_planar mean") < columns.index("stored")
+    described = rows_of(tables(study)["runs-columns.csv"])
+    assert [row["column"] for row in described] == columns
+    assert all(re.fullmatch("[a-z0-9_]+", column) for column in columns)
+    assert all(row["meaning"] for row in described)
+    fitness = next(row for row in described if row["column"] == "epuck_worst")
+    assert fitness["unit"] == "fitness, at most 300"
+    assert columns.index("epuck_mean") < columns.index("epuck_planar_mean")
+    assert columns.index("epuck_planar_mean") < columns.index("stored")
 
 
 def test_a_run_that_says_less_has_empty_cells(tmp_path):
@@ -129,7 +135,7 @@ def test_a_run_that_says_less_has_empty_cells(tmp_path):
     (path / "ga/seed-1/timing.csv").unlink()
     data = load_study(path)
     row = next(r for r in rows_of(tables(data)["runs.csv"]) if r["experiment"] == "ga")
-    for column in ("epuck worst", "epuck following", "epuck mean_low", "control_steps"):
+    for column in ("epuck_worst", "epuck_following", "epuck_mean_low", "control_steps"):
         assert row[column] == ""
     # of a criterion that not every run can meet or fail nothing is said
     assert {each.criterion for each in outcomes(data)} == {MATCHES}
