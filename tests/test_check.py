@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from epuck_mj.check import report
+from epuck_mj.check import picture, report
 from epuck_mj.check.__main__ import check as check_command
 from epuck_mj.check.arena import check_arena
 from epuck_mj.check.findings import Severity
@@ -434,7 +434,14 @@ def test_the_gap_is_where_it_is_and_as_wide(check):
     assert (x, y) == (pytest.approx(0.1, abs=0.03), pytest.approx(0.31, abs=0.05))
 
 
-def test_picture_shows_walls_and_region(check):
+def test_picture_shows_walls_and_region(check, monkeypatch):
+    figures, drawn = [], picture.region_figure
+
+    def kept(*arguments):
+        figures.append(drawn(*arguments))
+        return figures[-1]
+
+    monkeypatch.setattr("epuck_mj.check.picture.region_figure", kept)
     status, lines = check(ARENA, "--picture", "region.png")
     assert (status, lines[-1]) == (0, "picture: region.png")
     pixels = imread("region.png")[..., :3]
@@ -442,6 +449,9 @@ def test_picture_shows_walls_and_region(check):
     grey = (np.abs(pixels - 0.45) < 0.01).all(axis=-1).mean()
     assert 0.2 < green < 0.8
     assert grey > 0.02
+    (legend,) = figures[0].legends
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert texts == ["robot's middle may start", "walls", "robot's size"]
     # one that leaks shows how
     status, lines = check(ERRORS["door"][0], "--picture", "leak.png")
     assert (status, lines[-1]) == (1, "picture: leak.png")

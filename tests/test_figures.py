@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.image import imread
+from matplotlib.legend import Legend
 from matplotlib.patches import Polygon
 
 from epuck_mj.errors import UserError
@@ -44,6 +45,15 @@ def collections(axes, kind):
     return [found for found in axes.collections if isinstance(found, kind)]
 
 
+def legend_texts(figure):
+    return [
+        text.get_text()
+        for legend in figure.legends
+        if isinstance(legend, Legend)
+        for text in legend.get_texts()
+    ]
+
+
 def test_fitness_figure_shows_best_and_mean():
     best, mean = np.linspace(10, 200, 10), np.linspace(5, 150, 10)
     figure = fitness_figure(EVALUATIONS, best, mean, "DE", steps=250)
@@ -56,9 +66,9 @@ def test_fitness_figure_shows_best_and_mean():
     assert axes.get_xlabel() == "individual evaluations"
     assert axes.get_ylabel() == "stored fitness (max 250)"
     assert axes.get_title() == "DE"
-    legend = axes.get_legend()
-    assert legend is not None
-    assert len(legend.get_texts()) == 2
+    # beside the curves, never on them
+    assert axes.get_legend() is None
+    assert legend_texts(figure) == ["best of the generation", "mean of the population"]
 
 
 def test_one_generation_is_enough(tmp_path):
@@ -70,6 +80,7 @@ def test_trajectory_figure_shows_paths_walls_and_ends(scene, trajectories):
     *panels, bar = figure.axes
     assert bar.get_ylabel() == "step fitness (product)"
     assert [axes.get_title() for axes in panels] == ["free", "crash"]
+    assert legend_texts(figure) == ["start", "robot at the end", "crash"]
     for axes, trajectory in zip(panels, trajectories, strict=True):
         (path,) = collections(axes, LineCollection)
         points = trajectory.pose[:, :2]

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from matplotlib.legend import Legend
 
 from epuck_mj.constants import TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
@@ -16,8 +17,9 @@ from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.motors import Speeds
 from evolution.gap import worlds as gap_worlds
 from evolution.gap.__main__ import measure_gap
+from evolution.gap.figure import kept_figure
 from evolution.gap.gap_document import gap_document
-from evolution.gap.groups import experiments, peers
+from evolution.gap.groups import experiments, labels, peers
 from evolution.gap.outcomes import Outcome, abroad, ideal
 from evolution.gap.transfer import (
     Gap,
@@ -29,6 +31,7 @@ from evolution.gap.transfer import (
 from evolution.gap.worlds import ARENAS, LATENCY_MAX, WORLD_RANGES, World, met, worlds
 from evolution.named_policies import NamedPolicy, named_policies
 from evolution.pages.blocks import to_markdown
+from evolution.pages.style import LOOKS
 
 CHAMPION = Path(__file__).parent.parent / "results/paper/de-best/seed-1/champion.json"
 HOME = World(
@@ -218,6 +221,11 @@ def test_policies_are_grouped_by_experiment_and_by_speed():
         "b/champion.json": [5],
         "wall-follower": [6],
     }
+    # a run that says nothing of its config has no other name
+    assert list(labels(policies, experiments(policies)).values())[-2:] == [
+        "b/champion.json",
+        "hand-written wall follower",
+    ]
     assert peers(policies) == {"0.129 m/s": [0, 2, 4, 5, 6], "0.04 m/s": [1, 3]}
 
 
@@ -250,6 +258,27 @@ def test_the_document_says_who_kept_what():
     # late in the second and the third world: shares 0.82, 0.4 and 0.5, 1
     assert "| experiment | robot | n | 0 | 2 |" in text
     assert "| a | epuck | 2 | 84% | 68% |" in text
+
+
+def test_the_figure_names_experiments_as_reports_do():
+    policies = [*named_policies(str(CHAMPION.parent)), FOLLOWER]
+    groups = experiments(policies)
+    members = [0, 1]
+    transfer = Transfer(
+        *(getattr(TRANSFER, f.name)[..., members] for f in fields(TRANSFER))
+    )
+    names = [policy.name for policy in policies]
+    gap = Gap(names, {"epuck": transfer}, groups, {"fast": members}, 5, LATENCY)
+    figure = kept_figure(gap, labels(policies, groups))
+    (legend,) = figure.legends
+    assert isinstance(legend, Legend)
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "DE/best/1/bin (n = 1)",
+        "hand-written wall follower (n = 1)",
+    ]
+    champion, follower, *_ = figure.axes[0].lines
+    assert champion.get_color() == LOOKS["de-best"].color
+    assert follower.get_color() == "black"
 
 
 def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):

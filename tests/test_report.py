@@ -29,15 +29,18 @@ from evolution.pages.blocks import (
     Paragraph,
     Picture,
     Table,
+    anchor,
     to_html,
     to_markdown,
+    with_contents,
 )
 from evolution.pages.csv_text import csv_text
-from evolution.pages.words import spread
+from evolution.pages.words import numbered, spread
 from evolution.report.__main__ import report_study
 from evolution.report.measures import BEST_STORED
+from evolution.report.page import report_blocks
 from evolution.report.report_folder import tables
-from evolution.report.run_table import run_rows
+from evolution.report.run_table import described_columns, run_rows
 from evolution.report.samples import TARGET_SHARES
 from evolution.report.sections.comparisons import compared, comparisons, comparisons_of
 from evolution.report.sections.cost_of_targets import target_costs
@@ -47,6 +50,7 @@ from evolution.report.sections.what_stored_fitness_promised import (
     WITH_NOISE,
     what_stored_fitness_promised_section,
 )
+from evolution.report.sections.what_was_run import scale_of
 from evolution.report.summary_json import summary_fields, summary_text
 from evolution.statistics.estimates import rank_correlation
 from evolution.statistics.significance import holm, stars
@@ -105,15 +109,21 @@ def test_runs_read_back_exactly(study):
         run = next(
             r for r in study.runs[row["experiment"]] if r.seed == int(row["seed"])
         )
-        assert float(row["epuck mean"]) == run.held_out("epuck")
+        assert float(row["epuck_mean"]) == run.held_out("epuck")
         assert float(row["stored"]) == run.scores.stored
         assert int(row["evaluations"]) == 3000
         # a generation that was repeated after a crash counts once
         assert int(row["control_steps"]) == 1900
         assert Path(row["path"]) == run.path
     columns = list(rows[0])
-    assert columns.index("epuck mean") < columns.index("epuck_planar mean")
-    assert columns.index("epuck_planar mean") < columns.index("stored")
+    described = rows_of(tables(study)["runs-columns.csv"])
+    assert [row["column"] for row in described] == columns
+    assert all(re.fullmatch("[a-z0-9_]+", column) for column in columns)
+    assert all(row["meaning"] for row in described)
+    fitness = next(row for row in described if row["column"] == "epuck_worst")
+    assert fitness["unit"] == "fitness, at most 300"
+    assert columns.index("epuck_mean") < columns.index("epuck_planar_mean")
+    assert columns.index("epuck_planar_mean") < columns.index("stored")
 
 
 def test_a_run_that_says_less_has_empty_cells(tmp_path):
@@ -129,7 +139,7 @@ def test_a_run_that_says_less_has_empty_cells(tmp_path):
     (path / "ga/seed-1/timing.csv").unlink()
     data = load_study(path)
     row = next(r for r in rows_of(tables(data)["runs.csv"]) if r["experiment"] == "ga")
-    for column in ("epuck worst", "epuck following", "epuck mean_low", "control_steps"):
+    for column in ("epuck_worst", "epuck_following", "epuck_mean_low", "control_steps"):
         assert row[column] == ""
     # of a criterion that not every run can meet or fail nothing is said
     assert {each.criterion for each in outcomes(data)} == {MATCHES}
@@ -344,6 +354,8 @@ class Soundness(HTMLParser):
         super().__init__()
         self.open: list[str] = []
         self.text: list[str] = []
+        self.links: list[str] = []
+        self.ids: list[str] = []
 
     def handle_starttag(self, tag, attrs):
         if tag not in self.VOID:
@@ -351,7 +363,12 @@ class Soundness(HTMLParser):
         assert tag not in ("script", "link", "iframe")
         for name, value in attrs:
             assert not name.startswith("on")
-            if name in ("src", "href"):
+            if name == "href":
+                self.links.append((value or "").removeprefix("#"))
+                assert (value or "").startswith("#")
+            if name == "id":
+                self.ids.append(value or "")
+            if name == "src":
                 assert (value or "").startswith("data:image/svg+xml;base64,")
 
     def handle_endtag(self, tag):
@@ -366,6 +383,8 @@ def check_html(text):
     parser.feed(text)
     parser.close()
     assert parser.open == []
+    assert len(set(parser.ids)) == len(parser.ids)
+    assert set(parser.links) <= set(parser.ids)
     assert not re.search(r"https?:|//[a-z]|url\(|@import", text)
     return " ".join("".join(parser.text).split())
 
@@ -425,8 +444,8 @@ def test_report_of_a_partial_study(written, capsys):
     assert headings[:3] == ["What is missing", "What was run", "Held-out fitness"]
     assert "- ga: no finished run of seed 3" in text
     # held-out first, on wheels first, then what evolution believes
-    head = next(line for line in text.splitlines() if "| best run" in line)
-    order = [head.index(w) for w in ("wheeled robot", "planar robot", "stored")]
+    head = next(line for line in text.splitlines() if ": best run" in line)
+    order = [head.index(w) for w in ("wheeled robot", "planar robot", "best stored")]
     assert order == sorted(order)
     assert "no verdict" in text
     assert not re.search(r"significan|\\\*", text)
@@ -436,6 +455,113 @@ def test_report_of_a_partial_study(written, capsys):
     assert "ga: no finished run of seed 3" in words
     assert "A <fast> processor" in words
     assert len(page) < 5e6
+
+
+def test_contents_link_every_section(written):
+    text = (written / "out/report.md").read_text()
+    page = (written / "out/report.html").read_text()
+    sections = re.findall(r"^## (.*)$", text, re.MULTILINE)
+    links = re.findall(r"^- \[(.*)\]\(#(.*)\)$", text, re.MULTILINE)
+    assert [title for title, _ in links] == sections
+    # before all of them
+    assert text.index("](#") < text.index("\n## ")
+    for title, target in links:
+        assert target == anchor(title)
+        assert f'<h2 id="{target}">{title}</h2>' in page
+        assert f'href="#{target}"' in page
+    # as GitHub makes them
+    assert anchor("How, (to) get-it: 2 x_y?") == "how-to-get-it-2-x_y"
+
+
+def test_sections_of_one_name_have_no_contents():
+    with pytest.raises(ValueError, match="different names"):
+        with_contents([Heading("A b"), Heading("a b")])
+
+
+def test_tables_have_columns_of_different_names_and_units(study):
+    found = [b for b in report_blocks(study, {}, "out", False) if isinstance(b, Table)]
+    assert len(found) > 8
+    for table in found:
+        assert all(table.columns)
+        assert len(set(table.columns)) == len(table.columns)
+    heads = {column for table in found for column in table.columns}
+    assert {
+        "wheeled robot: crashes [%]",
+        "planar robot: best run [of 300]",
+        "clearance [mm]",
+        "to 50 [evaluations]",
+        "control steps [k]",
+    } <= heads
+
+
+def test_few_and_many_are_written_as_they_are_spoken(written):
+    text = (written / "out/report.md").read_text()
+    assert "5 finished runs of 2 experiments" in text
+    assert "each table (1 pair)" in text
+    assert not re.search(r"\b1 (?:pairs|runs|experiments)\b", text)
+    # 1,900 of each run
+    assert "| 3,000 | 5 | 1.9 (1.9, 1.9, 1.9) |" in text
+    assert "in thousands" in text
+    assert [numbered(n, "run") for n in (0, 1, 2000)] == [
+        "0 runs",
+        "1 run",
+        "2,000 runs",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("steps", "expected"),
+    [
+        ([40, 9e6], (1.0, "", "")),
+        ([], (1.0, "", "")),
+        ([6e3, 9e6], (1e3, "k", "thousands")),
+        ([2e5, 9e6], (1e6, "M", "millions")),
+    ],
+)
+def test_no_run_has_zero_thousands(steps, expected):
+    assert scale_of(np.array(steps, float)) == expected
+
+
+def test_wide_tables_say_that_they_can_be_moved(written):
+    page = (written / "out/report.html").read_text()
+    assert page.count("<table>") == page.count('class="scroll" tabindex="0"')
+    assert page.count('class="table wide"') > 0
+    narrow, wide = (to_html("", [Table(["a"] * n, [["1"] * n])]) for n in (2, 30))
+    assert '"table wide"' in wide
+    assert '"table wide"' not in narrow
+    # an interval stays in one line
+    cells = to_html("", [Table(["a", "b"], [["x [y]", "1.0 [-2.5, 3]"]])])
+    assert ">x [y]</td>" in cells
+    assert ">1.0 <span>[-2.5, 3]</span></td>" in cells
+
+
+def test_columns_of_a_robot_of_ones_own_have_plain_names(large):
+    robots = {"epuck_planar": "/a b/My Robot-2.xml", "epuck": "/c/my_robot_2.xml"}
+    runs = tuple(
+        replace(
+            run,
+            scores=run.scores.model_copy(
+                update={
+                    "held_out": {
+                        robots[robot]: test
+                        for robot, test in run.scores.held_out.items()
+                    }
+                }
+            ),
+        )
+        for run in large.runs["ga"]
+    )
+    data = replace(
+        large,
+        runs={"ga": runs},
+        configs={"ga": large.configs["ga"]},
+        robots=tuple(robots.values()),
+        yardstick={},
+    )
+    (row, *_) = run_rows(data)
+    assert row["my_robot_2_mean"] == runs[0].held_out("/a b/My Robot-2.xml")
+    assert row["my_robot_2_1_mean"] == runs[0].held_out("/c/my_robot_2.xml")
+    assert list(row) == [each["column"] for each in described_columns(data)]
 
 
 def test_figures_are_shown_and_there(written):

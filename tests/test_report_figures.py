@@ -4,6 +4,7 @@ import itertools
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from evolution.judging.scores import HeldOut, Scores
 from evolution.pages import figure_files
 from evolution.pages.figure_files import write_figure
 from evolution.pages.style import LOOKS, looks
-from evolution.pages.words import label
+from evolution.pages.words import experiment_label, label, robot_name
 from evolution.report.figures import STUDY_FIGURES, drawn_figures
 from evolution.report.figures.behaviour_bars import CLASS_LOOKS, behaviour_figure
 from evolution.report.figures.champions import (
@@ -39,7 +40,7 @@ from evolution.report.figures.curves import (
 )
 from evolution.report.figures.trajectories import median_run, trajectories_figure
 from evolution.report.samples import TARGET_SHARES
-from evolution.settings.config_files import find_config, load_config
+from evolution.settings.config_files import load_config, shipped_experiments
 from evolution.study.data import RunData, StudyData
 
 ROBOTS = ("epuck_planar", "epuck")
@@ -78,10 +79,15 @@ def a_run(name, seed, robots=ROBOTS, evaluations=30_000):
 
 
 def a_study(n_runs=N_RUNS, robots=ROBOTS, yardstick=True):
-    config = load_config(find_config("de-best"))
+    shipped = shipped_experiments()
     return StudyData(
         path=Path("nowhere"),
-        configs=dict.fromkeys(n_runs, config.model_copy(update={"steps": 20})),
+        configs={
+            name: load_config(shipped.get(name, shipped["de-best"])).model_copy(
+                update={"steps": 20}
+            )
+            for name in n_runs
+        },
         runs={
             name: tuple(a_run(name, seed, robots) for seed in range(1, n + 1))
             for name, n in n_runs.items()
@@ -148,25 +154,28 @@ def test_a_common_grid_has_few_points_where_all_runs_have_begun():
 
 
 @pytest.mark.parametrize("name", ["de-best", "ga", "my own"])
-def test_fitness_shows_medians_bands_and_every_run(data, name):
+def test_fitness_shows_medians_bands_and_every_best(data, name):
     figure, caption = growth_figure(data, name)
     (axes,) = figure.axes
     runs, n = data.runs[name], N_RUNS[name]
     grid = common_grid(runs)
-    thick = [line for line in axes.lines if line.get_linewidth() > 1]
+    thick = [line for line in axes.lines if line.get_linewidth() > 0.5]
     bands = collections(axes, PolyCollection)
     for i, column in enumerate(["best", "mean"]):
         # all runs of these experiments have the same generations
         rows = np.isin(runs[0].history["evaluations"], grid)
-        values = np.array([run.history[column][rows] for run in runs])
+        values = np.array([run.history[column] for run in runs])
+        if column == "best":
+            values = np.maximum.accumulate(values, axis=1)
+        values = values[:, rows]
         np.testing.assert_allclose(xy(thick[i]), [grid, np.median(values, axis=0)])
         if n > 1:
             edge = np.asarray(bands[i].get_paths()[0].vertices)
             low, high = np.quantile(values, [0.25, 0.75], axis=0)
             assert edge[:, 1].min() == pytest.approx(low.min())
             assert edge[:, 1].max() == pytest.approx(high.max())
-    # best and mean, each run's, and the yardstick's
-    assert len(axes.lines) == 2 + (2 * n if n > 1 else 0) + 1
+    # best and mean, each run's best, and the yardstick's
+    assert len(axes.lines) == 2 + (n if n > 1 else 0) + 1
     np.testing.assert_array_equal(axes.lines[-1].get_ydata(), [200, 200])
     assert (
         "Black and dashed: held-out fitness of the hand-written wall follower"
@@ -174,8 +183,20 @@ def test_fitness_shows_medians_bands_and_every_run(data, name):
     )
     assert len(bands) == (2 if n > 1 else 0)
     assert axes.get_ylabel() == "stored fitness (max 300)"
-    assert f"{label(name)} (n = {n})" in legend_texts(figure)
+    assert f"{label(data, name)} (n = {n})" in legend_texts(figure)
     assert f"n = {n}" in caption and "stored fitness" in caption
+
+
+def test_no_median_of_means_of_populations_that_begin_anew():
+    runs = tuple(a_run("ga", seed) for seed in (1, 2))
+    anew = replace(a_study({"cma-es": 0}), runs={"cma-es": runs})
+    figure, caption = growth_figure(anew, "cma-es")
+    assert "population mean" not in legend_texts(figure)
+    assert "begins anew" in caption
+    # of one run it is no median
+    figure, caption = growth_figure(replace(anew, runs={"cma-es": runs[:1]}), "cma-es")
+    assert "population mean" in legend_texts(figure)
+    assert "begins anew" not in caption
 
 
 def test_no_curve_of_an_experiment_without_runs(data):
@@ -192,8 +213,8 @@ def test_fitness_all_shows_the_best_so_far_and_the_yardstick(data):
         rows = np.isin(runs[0].history["evaluations"], common_grid(runs))
         best = [np.maximum.accumulate(run.history["best"])[rows] for run in runs]
         np.testing.assert_allclose(xy(line)[1], np.median(best, axis=0))
-        assert line.get_color() == looks(data)[name].color
-        assert line.get_marker() == looks(data)[name].marker
+        assert line.get_color() == looks(data.configs)[name].color
+        assert line.get_marker() == looks(data.configs)[name].marker
     assert set(xy(reference)[1]) == {200}
     assert legend_texts(figure)[1:] == [
         "DE/best/1/bin (n = 12)",
@@ -238,7 +259,7 @@ def test_stored_and_held_out_shows_every_run_in_order_of_stored_fitness(data):
             np.testing.assert_array_equal(test[:, 1], data.held_out(name, robot)[order])
         (luck,) = collections(axes, LineCollection)
         assert len(luck.get_segments()) == N_RUNS[name]
-        assert axes.get_title() == f"{label(name)} (n = {N_RUNS[name]})"
+        assert axes.get_title() == f"{label(data, name)} (n = {N_RUNS[name]})"
     assert "held-out, wheeled robot" in legend_texts(figure)
     assert "GA (n = 2)" in caption
 
@@ -316,34 +337,75 @@ def test_median_run_is_the_lower_of_two(data):
         assert median_run(data, name).held_out("epuck") == expected
 
 
-def test_trajectories_has_a_column_per_experiment(data, tmp_path):
-    figure, caption = trajectories_figure(data)
+@pytest.fixture(scope="module")
+def trajectories(data):
+    """Figure and caption, where one experiment lives in another world."""
+    other = data.configs["ga"].model_copy(update={"fitness": "literal"})
+    return trajectories_figure(replace(data, configs=data.configs | {"ga": other}))
+
+
+def test_trajectories_are_of_every_experiment_of_a_world(data, trajectories, tmp_path):
+    figure, caption = trajectories
     *panels, _ = figure.axes
-    seeds = {name: median_run(data, name).seed for name in ("de-best", "ga")}
-    assert [axes.get_title().split("\n")[0] for axes in panels] == 2 * [
-        f"DE/best/1/bin, seed {seeds['de-best']}",
-        f"GA, seed {seeds['ga']}",
+    seeds = {name: median_run(data, name).seed for name in ("de-best", "my own")}
+    assert [axes.get_title().split("\n")[:2] for axes in panels] == [
+        [name, f"seed {seeds[experiment]}, start {start}"]
+        for name, experiment in [("DE/best/1/bin", "de-best"), ("my own", "my own")]
+        for start in (0, 1)
     ]
-    # the same start in each row
+    # the same two starts
     starts = [xy(axes.lines[0]) for axes in panels]
-    np.testing.assert_array_equal(starts[0], starts[1])
-    assert (starts[0] != starts[2]).all()
-    assert f"seed {seeds['ga']} of GA (n = 2)" in caption
+    np.testing.assert_array_equal(starts[:2], starts[2:])
+    assert (starts[0] != starts[1]).all()
+    assert f"seed {seeds['my own']} of my own (n = 1)" in caption
+    assert "fitness are others: GA." in caption
+    assert legend_texts(figure)[1:3] == ["start", "robot at the end"]
     figure.savefig(tmp_path / "trajectories.svg")
     assert (tmp_path / "trajectories.svg").stat().st_size < 300_000
-
-
-def test_trajectories_of_other_experiments_if_none_is_the_papers():
-    figure, _ = trajectories_figure(a_study({"my own": 1}))
-    assert [axes.get_title()[:6] for axes in figure.axes[:-1]] == ["my own"] * 2
 
 
 # all of them
 
 
+def words_of(figure):
+    """Everything that a reader can read in a figure."""
+    ticks = [
+        text.get_text()
+        for axes in figure.axes
+        for text in [*axes.get_xticklabels(), *axes.get_yticklabels()]
+    ]
+    titles = [axes.get_title() for axes in figure.axes]
+    return "\n".join([*titles, *ticks, *legend_texts(figure)])
+
+
+def test_every_experiment_is_in_every_figure(data, trajectories):
+    for name, draw in STUDY_FIGURES.items():
+        figure, _ = trajectories if name == "trajectories" else drawn(draw(data))
+        for who in ("DE/best/1/bin", "my own"):
+            assert who in words_of(figure), name
+
+
+def test_an_experiment_is_called_as_its_user_calls_it(data):
+    assert [label(data, name) for name in data.configs] == [
+        "DE/best/1/bin",
+        "GA",
+        "my own",
+        "CMA-ES",
+    ]
+    # another population makes it another one than the shipped
+    parameters: Any = data.configs["ga"].optimizer
+    optimizer = replace(parameters, population=30)
+    own = data.configs["ga"].model_copy(update={"optimizer": optimizer})
+    assert experiment_label("ga", own) == "ga"
+    # who spends less is not
+    short = data.configs["ga"].model_copy(update={"evaluations": 150})
+    assert experiment_label("ga", short) == "GA"
+    assert robot_name("/a/my_robot.xml") == "my_robot"
+
+
 def test_looks_are_fixed_and_all_different():
     names = [*LOOKS, *(f"mine {i}" for i in range(12))]
-    found = looks(replace(a_study({}), configs=dict.fromkeys(names)))
+    found = looks(names)
     assert {name: found[name] for name in LOOKS} == dict(LOOKS)
     drawn = [(look.color, look.dashes, look.marker) for look in found.values()]
     assert all(a != b for a, b in itertools.combinations(drawn, 2))

@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from epuck_mj.scene.model import Scene
@@ -44,15 +45,20 @@ def region_figure(scene: Scene, grid: Grid, title: str) -> Figure:
         PolyCollection(wall_outlines(scene), facecolor=WALL, edgecolor=WALL)
     )
     shell = shell_outline(scene)
-    if enclosed:
-        # the robot, for scale, on the node farthest along the diagonal
-        shell = shell + grid.nodes[grid.inside][-1]
-        axes.fill(*shell.T, facecolor="none", edgecolor="black")
-    legend = [
+    legend: list[Patch | Line2D] = [
         Patch(facecolor=fraction(color), alpha=0.5, label=f"robot's middle {meaning}"),
         Patch(facecolor=WALL, label="walls"),
     ]
-    figure.legend(handles=legend, loc="outside lower center", ncols=2, frameon=False)
+    if enclosed:
+        # on the node farthest along the diagonal
+        shell = shell + grid.nodes[grid.inside][-1]
+        axes.fill(*shell.T, facecolor="none", edgecolor="black")
+        outline = {"mfc": "none", "mec": "black", "ms": 9}
+        size = Line2D([], [], ls="", marker="o", label="robot's size", **outline)
+        legend.append(size)
+    figure.legend(
+        handles=legend, loc="outside lower center", ncols=len(legend), frameon=False
+    )
     axes.set(title=title, xlabel="x [m]", ylabel="y [m]", aspect="equal")
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     return figure

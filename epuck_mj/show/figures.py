@@ -4,7 +4,8 @@ Figures are made as objects, never through pyplot: nothing global, no window.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -12,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from numpy.typing import ArrayLike
 
@@ -25,6 +27,27 @@ BLUE, VERMILION = colors.fraction(colors.BLUE), colors.fraction(colors.VERMILION
 
 # yellow to dark blue, without the end that white paper swallows
 FITNESS_COLORS = ListedColormap(colormaps["cividis_r"](np.linspace(0.1, 1, 256)))
+
+
+START: Mapping[str, Any] = {
+    "marker": "o",
+    "color": "white",
+    "markeredgecolor": "black",
+    "markersize": 5,
+}
+AT_END: Mapping[str, Any] = {
+    "marker": "o",
+    "color": "none",
+    "markeredgecolor": "black",
+    "markersize": 7,
+    "markeredgewidth": 1.2,
+}
+CRASH: Mapping[str, Any] = {
+    "marker": "x",
+    "color": VERMILION,
+    "markersize": 8,
+    "markeredgewidth": 2,
+}
 
 
 def fitness_figure(
@@ -45,8 +68,8 @@ def fitness_figure(
     """
     figure = Figure(figsize=(6, 3.7), layout="constrained")
     axes = figure.add_subplot()
-    axes.plot(evaluations, best, color=BLUE, label="best individual")
-    axes.plot(evaluations, mean, color=VERMILION, lw=1, label="population mean")
+    axes.plot(evaluations, best, color=BLUE, label="best of the generation")
+    axes.plot(evaluations, mean, color=VERMILION, lw=1, label="mean of the population")
     axes.set(
         title=title,
         xlabel="individual evaluations",
@@ -57,7 +80,7 @@ def fitness_figure(
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.9", lw=0.6)
-    axes.legend(frameon=False, loc="lower right")
+    figure.legend(loc="outside lower center", ncols=2, frameon=False)
     return figure
 
 
@@ -66,6 +89,7 @@ def trajectory_figure(
     trajectories: Sequence[Trajectory],
     task: TaskParameters,
     titles: Sequence[str],
+    columns: int | None = None,
 ) -> Figure:
     """The arena from above with the path of each trajectory, side by side.
 
@@ -74,6 +98,7 @@ def trajectory_figure(
         trajectories: one panel each.
         task: what the trials were.
         titles: one per trajectory.
+        columns: panels side by side; as many as rows, or one more, if not given.
 
     Raises:
         ValueError: if there is no trajectory, or another number of titles.
@@ -83,7 +108,7 @@ def trajectory_figure(
             f"expected one title per trajectory, got {len(titles)} titles and "
             f"{len(trajectories)} trajectories"
         )
-    columns = math.ceil(math.sqrt(len(trajectories)))
+    columns = columns or math.ceil(math.sqrt(len(trajectories)))
     rows = -(-len(trajectories) // columns)
     figure = Figure(figsize=(3.2 * columns + 1, 3.4 * rows), layout="constrained")
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
@@ -92,16 +117,27 @@ def trajectory_figure(
     for axes, trajectory, title in zip(panels.flat, trajectories, titles, strict=False):
         axes.add_collection(PolyCollection(walls, facecolor="0.45", edgecolor="none"))
         path = _draw_trajectory(axes, scene, trajectory)
-        axes.set(title=title, aspect="equal")
+        axes.set(title=title, aspect="equal", xlabel="x [m]", ylabel="y [m]")
         axes.autoscale_view()
         axes.label_outer()
+    used = list(panels.flat[: len(trajectories)])
+    for axes in used[-columns:]:
+        # none may be below
+        axes.tick_params(labelbottom=True)
+        axes.set_xlabel("x [m]")
     for axes in panels.flat[len(trajectories) :]:
         axes.remove()
-    figure.supxlabel("x [m]", fontsize="medium")
-    figure.supylabel("y [m]", fontsize="medium")
-    used = list(panels.flat[: len(trajectories)])
     figure.colorbar(
         path, ax=used, label=f"step fitness ({task.fitness})", shrink=0.8, aspect=25
+    )
+    marks = [
+        Line2D([], [], ls="", label="start", **START),
+        Line2D([], [], ls="", label="robot at the end", **AT_END),
+    ]
+    if any(trajectory.crashed for trajectory in trajectories):
+        marks.append(Line2D([], [], ls="", label="crash", **CRASH))
+    figure.legend(
+        handles=marks, loc="outside lower center", ncols=len(marks), frameon=False
     )
     return figure
 
@@ -121,7 +157,7 @@ def _draw_trajectory(
     )
     axes.add_collection(path)
     start, (x, y, yaw) = points[0], trajectory.pose[-1]
-    axes.plot(*start, "o", color="white", markeredgecolor="black", ms=5)
+    axes.plot(*start, **START)
     forward = np.array([np.cos(yaw), np.sin(yaw)])
     left = np.array([-forward[1], forward[0]])
     shell = shell_outline(scene)
@@ -130,5 +166,5 @@ def _draw_trajectory(
     nose = np.array([(x, y), (x, y) + shell[:, 0].max() * forward])
     axes.plot(*nose.T, color="black", lw=1.2)
     if trajectory.crashed:
-        axes.plot(x, y, "x", color=VERMILION, ms=8, mew=2)
+        axes.plot(x, y, **CRASH)
     return path

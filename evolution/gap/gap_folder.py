@@ -12,7 +12,7 @@ from tqdm import tqdm
 from epuck_mj.host.files import write_text, writing
 from evolution.gap.figure import kept_figure
 from evolution.gap.gap_document import gap_document, gap_summary
-from evolution.gap.groups import experiments, peers
+from evolution.gap.groups import experiments, labels, peers
 from evolution.gap.outcomes import Outcome, abroad, ideal
 from evolution.gap.transfer import Gap, Transfer, verdict
 from evolution.gap.worlds import World, worlds
@@ -112,7 +112,8 @@ def _write(
         write_text(folder / "gap.csv", _rows(policies, places, transfers))
         write_text(folder / "gap.md", to_markdown(gap_document(gap)))
         write_text(folder / "summary.md", to_markdown([gap_summary(gap)]))
-    write_figure(kept_figure(gap), folder, "gap")
+    names = labels(policies, gap.groups)
+    write_figure(kept_figure(gap, names), folder, "gap")
 
 
 def _rows(

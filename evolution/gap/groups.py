@@ -1,10 +1,12 @@
 """Groups of policies: of one experiment, or of one speed."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from epuck_mj.policies.wall_follower import YARDSTICK
 from evolution.named_policies import NamedPolicy
+from evolution.pages.words import YARDSTICK_LABEL, experiment_label
 from evolution.study.directory import PREFIX
 
 
@@ -19,6 +21,18 @@ def experiments(policies: Sequence[NamedPolicy]) -> dict[str, list[int]]:
     return {
         place.name if names[place.name] == 1 else place.as_posix(): members
         for place, members in places.items()
+    }
+
+
+def labels(
+    policies: Sequence[NamedPolicy], groups: Mapping[str, Sequence[int]]
+) -> dict[str, str]:
+    """Names for readers of the groups that `experiments` found."""
+    return {
+        group: YARDSTICK_LABEL
+        if group == YARDSTICK
+        else experiment_label(group, policies[members[0]].config)
+        for group, members in groups.items()
     }
 
 

@@ -11,12 +11,25 @@ FIGURES_FOLDER = "figures"
 
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #1a1a1a; background: #fff;
-  max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
+  max-width: 60rem; margin: 2rem auto; padding: 0 1rem; overflow-wrap: break-word; }
 h1, h2, h3 { line-height: 1.2; margin-top: 2em; } h1 { margin-top: 0; }
-table { border-collapse: collapse; font-size: 0.875rem; margin: 1em 0;
-  font-variant-numeric: tabular-nums; display: block; overflow-x: auto; }
+table { border-collapse: separate; border-spacing: 0; font-size: 0.875rem;
+  font-variant-numeric: tabular-nums; }
 th, td { border-bottom: 1px solid #ddd; padding: 0.3em 0.7em; text-align: left; }
 th { border-bottom: 2px solid #666; vertical-align: bottom; }
+th:first-child, td:first-child { position: sticky; left: 0; background: #fff;
+  padding-left: 0; }
+td span { white-space: nowrap; }
+.table { margin: 1em 0; }
+.scroll { overflow-x: auto; }
+@media (max-width: 40rem) {
+  table { font-size: 0.8125rem; }
+  th:first-child, td:first-child { min-width: 6.5rem; max-width: 8rem;
+    overflow-wrap: anywhere; border-right: 1px solid #ddd; }
+  .wide::before { content: "\\2194  swipe the table sideways"; display: block;
+    font-size: 0.8125rem; color: #444; margin-bottom: 0.3em; }
+  .wide .scroll { border-right: 3px dotted #999; }
+}
 figure { margin: 1.5em 0; } figure img { max-width: 100%; height: auto; }
 figcaption { font-size: 0.875rem; color: #444; max-width: 46rem; }
 pre { background: #f4f4f4; padding: 0.8em; overflow-x: auto; font-size: 0.8125rem; }
@@ -43,6 +56,13 @@ class Listing:
     """Items, each a plain text."""
 
     items: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Contents:
+    """Links to headings, whose texts these are."""
+
+    headings: Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -82,7 +102,39 @@ class Picture:
     svg: bytes
 
 
-Block = Heading | Paragraph | Listing | Code | Table | Picture
+Block = Heading | Paragraph | Listing | Contents | Code | Table | Picture
+
+SECTION = 2
+"""Level of the headings that a list of contents names."""
+
+BOUNDS = r"[\[(][\d.,% -]+[\])]"
+"""What stands behind a number, and in one line: an interval or a sample."""
+
+WIDE = 54
+"""Letters side by side that a phone does not show."""
+
+GAP = 3
+"""Letters that have room between two columns."""
+
+
+def with_contents(blocks: Sequence[Block]) -> list[Block]:
+    """The document with a list of its sections before the first of them.
+
+    Raises:
+        ValueError: if two sections have the same heading.
+    """
+    places = [
+        i for i, b in enumerate(blocks) if isinstance(b, Heading) and b.level == SECTION
+    ]
+    titles = [b.text for b in blocks if isinstance(b, Heading) and b.level == SECTION]
+    if len({anchor(title) for title in titles}) < len(titles):
+        raise ValueError(f"expected sections of different names, got {titles}")
+    return [*blocks[: places[0]], Contents(titles), *blocks[places[0] :]]
+
+
+def anchor(heading: str) -> str:
+    """The name by which GitHub links a heading."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
 def to_markdown(blocks: Sequence[Block]) -> str:
@@ -98,6 +150,8 @@ def _markdown(block: Block) -> str:
             return _begun(text)
         case Listing(items):
             return "\n".join(f"- {_begun(item)}" for item in items)
+        case Contents(headings):
+            return "\n".join(f"- [{_escaped(h)}](#{anchor(h)})" for h in headings)
         case Code(lines):
             # longer than any inside
             fence = max(re.findall("`+", "\n".join(["``", *lines])), key=len) + "`"
@@ -136,16 +190,44 @@ def to_html(title: str, blocks: Sequence[Block]) -> str:
     from markdown_it import MarkdownIt
 
     markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
-    body = "".join(
-        _figure(each) if isinstance(each, Picture) else markdown.render(_markdown(each))
-        for each in blocks
-    )
+
+    def shown(block: Block) -> str:
+        if isinstance(block, Picture):
+            return _figure(block)
+        made = markdown.render(_markdown(block))
+        match block:
+            case Heading(text, level) if level == SECTION:
+                name = html.escape(anchor(text))
+                return made.replace("<h2>", f'<h2 id="{name}">', 1)
+            case Table():
+                kind = "table wide" if _letters(block) > WIDE else "table"
+                made = re.sub(f"(?<= ){BOUNDS}(?=</td>)", r"<span>\g<0></span>", made)
+                # what scrolls can be reached by keys
+                scroll = f'<div class="scroll" tabindex="0">\n{made}</div>'
+                return f'<div class="{kind}">{scroll}</div>\n'
+        return made
+
+    body = "".join(map(shown, blocks))
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{html.escape(title)}</title>\n<style>{STYLE}</style>\n"
         f"</head>\n<body>\n{body}</body>\n</html>\n"
     )
+
+
+def _letters(table: Table) -> int:
+    """Width of a table whose cells are broken wherever they can be, in letters."""
+    columns = zip(table.columns, *table.rows, strict=True)
+    return sum(
+        GAP + max(len(word) for cell in cells for word in _words(cell))
+        for cells in columns
+    )
+
+
+def _words(cell: str) -> list[str]:
+    """Parts of a cell that stay in one line."""
+    return re.findall(f"{BOUNDS}|\\S+", cell) or [""]
 
 
 def _figure(picture: Picture) -> str:

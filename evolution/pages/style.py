@@ -3,7 +3,7 @@
 Figures have the size they are printed at, so that text keeps its size.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import cycle
 from typing import Any
@@ -92,12 +92,12 @@ YARDSTICK_LOOK: Mapping[str, Any] = {
 YARDSTICK_SHORT = "hand-written, held-out"
 
 
-def looks(data: StudyData) -> dict[str, Look]:
+def looks(names: Iterable[str]) -> dict[str, Look]:
     """The look of each experiment, by name."""
     # 12 before the first comes back
     spare = zip(cycle(SPARE_COLORS), cycle(SPARE_LINES), strict=True)
     found = {}
-    for name in data.configs:
+    for name in names:
         if name in LOOKS:
             found[name] = LOOKS[name]
         else:
@@ -106,9 +106,9 @@ def looks(data: StudyData) -> dict[str, Look]:
     return found
 
 
-def with_count(name: str, n: int) -> str:
+def with_count(data: StudyData, name: str, n: int) -> str:
     """An experiment's name for readers with its number of runs."""
-    return f"{label(name)} (n = {n})"
+    return f"{label(data, name)} (n = {n})"
 
 
 def counts(data: StudyData) -> str:
@@ -117,7 +117,7 @@ def counts(data: StudyData) -> str:
     sizes = {len(each) for each in runs.values()}
     if len(sizes) == 1:
         return f"n = {sizes.pop()} per experiment"
-    return "; ".join(with_count(name, len(each)) for name, each in runs.items())
+    return "; ".join(with_count(data, name, len(each)) for name, each in runs.items())
 
 
 def count_evaluations(axes: Axes, last: float) -> None:

@@ -3,10 +3,16 @@
 import math
 import shlex
 from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 
+from evolution.settings.config import ExperimentConfig
+from evolution.settings.config_fields import OptimizerConfig
+from evolution.settings.config_files import load_config, shipped_experiments
 from evolution.statistics.estimates import FEWEST_FOR_INTERVAL, Interval, quartiles
+from evolution.study.data import StudyData
 
 LABELS: Mapping[str, str] = {
     "de-best": "DE/best/1/bin",
@@ -15,8 +21,11 @@ LABELS: Mapping[str, str] = {
     "cma-es": "CMA-ES",
     "one-plus-one-es": "(1+1)-ES",
     "random-search": "random search",
+    "de-best-calibrated": "DE/best/1/bin, calibrated",
+    "de-best-randomised": "DE/best/1/bin, randomised",
+    "ga-randomised": "GA, randomised",
 }
-"""Names of shipped experiments for readers."""
+"""Names of shipped experiments; any other is called as its user calls it."""
 
 PAPERS = ("de-best", "de-rand", "ga")
 """The experiments of the paper."""
@@ -32,14 +41,37 @@ NOTHING = "-"
 """Text that stands for an unknown value."""
 
 
-def label(experiment: str) -> str:
-    """An experiment's name for readers."""
-    return LABELS.get(experiment, experiment)
+def experiment_label(experiment: str, config: ExperimentConfig | None) -> str:
+    """An experiment's name for readers.
+
+    Args:
+        experiment: its name.
+        config: what it is; a user's own may have the name of a shipped one.
+    """
+    if config is None or experiment not in LABELS:
+        return experiment
+    own = config.optimizer != _shipped_optimizer(experiment)
+    return experiment if own else LABELS[experiment]
+
+
+@cache
+def _shipped_optimizer(experiment: str) -> OptimizerConfig:
+    return load_config(shipped_experiments()[experiment]).optimizer
+
+
+def label(data: StudyData, experiment: str) -> str:
+    """The name for readers of an experiment of a study."""
+    return experiment_label(experiment, data.configs[experiment])
 
 
 def robot_name(robot: str) -> str:
-    """A robot's name for readers."""
-    return ROBOT_NAMES.get(robot, robot)
+    """A robot's name for readers; that of its file if it is a user's own."""
+    return ROBOT_NAMES.get(robot, Path(robot).stem)
+
+
+def numbered(n: int, noun: str) -> str:
+    """So many of something: 1 run, 2 runs."""
+    return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
 
 
 SPREAD = f"Median [quartiles] over runs (below {FEWEST_FOR_INTERVAL}: every run)"
@@ -82,12 +114,12 @@ def between(interval: Interval, form: str = ".2f") -> str:
 
 
 def percent(share: float | None) -> str:
-    """Text of a share in percent; None and nan are unknown."""
-    return NOTHING if share is None or math.isnan(share) else f"{share:.1%}"
+    """Text of a share in percent, for a column that says so; None, nan are unknown."""
+    return NOTHING if share is None or math.isnan(share) else f"{100 * share:.1f}"
 
 
 def percent_median(shares: np.ndarray) -> str:
-    """The median of shares `(n,)` in percent."""
+    """The median of shares `(n,)` in percent, for a column that says so."""
     return percent(float(np.median(shares)) if shares.size else None)
 
 

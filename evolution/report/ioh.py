@@ -64,7 +64,7 @@ def export_histories(data: StudyData, folder: Path) -> None:
             "function_id": FUNCTION_ID,
             "function_name": FUNCTION,
             "maximization": True,
-            "algorithm": {"name": name, "info": label(name)},
+            "algorithm": {"name": name, "info": label(data, name)},
             "attributes": list(HEADER),
             "scenarios": [
                 {

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
-from evolution.pages.blocks import Block, Heading, Picture
+from evolution.pages.blocks import Block, Heading, Picture, with_contents
 from evolution.report.sections.behaviour import behaviour_section
 from evolution.report.sections.comparisons import comparisons_section
 from evolution.report.sections.cost_of_targets import cost_of_targets_section
@@ -43,4 +43,4 @@ def report_blocks(
     if left:
         blocks += [Heading("Fitness against evaluations"), *left.values()]
     last = how_to_get_every_number_again_section(data, output, ioh)
-    return [*blocks, *last]
+    return with_contents([*blocks, *last])

@@ -10,7 +10,7 @@ from evolution.pages.blocks import FIGURES_FOLDER, Picture, to_html, to_markdown
 from evolution.pages.csv_text import csv_text
 from evolution.report.ioh import export_histories
 from evolution.report.page import report_blocks
-from evolution.report.run_table import run_rows
+from evolution.report.run_table import described_columns, run_rows
 from evolution.report.sections.comparisons import PAIR_COLUMNS, pair_rows
 from evolution.report.sections.cost_of_targets import TARGET_COLUMNS, target_rows
 from evolution.report.sections.success import SUCCESS_COLUMNS, success_rows
@@ -52,9 +52,10 @@ def write_report(study: Path, output: Path, ioh: bool = False) -> tuple[str, ...
 
 def tables(data: StudyData) -> dict[str, str]:
     """Texts of the CSV files by name."""
-    runs = run_rows(data)
+    runs, described = run_rows(data), described_columns(data)
     return {
         "runs.csv": csv_text(list(runs[0]), runs),
+        "runs-columns.csv": csv_text(list(described[0]), described),
         "pairwise.csv": csv_text(["measure", *PAIR_COLUMNS], pair_rows(data)),
         "success.csv": csv_text(SUCCESS_COLUMNS, success_rows(data)),
         "targets.csv": csv_text(list(TARGET_COLUMNS), target_rows(data)),

@@ -2,60 +2,24 @@
 
 import csv
 import math
-from typing import Any
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
 
+from evolution.judging.scores import HeldOut
+from evolution.pages.words import robot_name
 from evolution.report.measures import shown_robots
 from evolution.run.directory import RunDirectory
 from evolution.study.data import RunData, StudyData
 
+T = TypeVar("T")
 
-def run_rows(data: StudyData) -> list[dict[str, Any]]:
-    """A row per run; None where a run does not say.
+Column = tuple[Callable[[T], Any], str, str]
+"""How to get a value, its unit, and what it means."""
 
-    `<robot> ...` is the held-out evaluation on that robot: fitness of the test starts,
-    bootstrap 95 % interval of its mean, mean of the worst 5 %, crashes per trial and
-    per minute, share of trials that follow a wall, clearance [m], share of trials with
-    a whole lap.
-    """
-    return [
-        _run_row(data, name, run)
-        for name, runs in data.with_runs.items()
-        for run in runs
-    ]
-
-
-def _run_row(data: StudyData, name: str, run: RunData) -> dict[str, Any]:
-    row: dict[str, Any] = {"experiment": name, "seed": run.seed}
-    for robot in shown_robots(data):
-        test = run.scores.held_out[robot]
-        low, high = test.interval
-        columns = {
-            "mean": test.mean,
-            "standard_deviation": test.standard_deviation,
-            "mean_low": low,
-            "mean_high": high,
-            "worst": test.worst,
-            "crash_rate": test.crash_rate,
-            "collisions_per_minute": test.collisions_per_minute,
-            "following": test.following,
-            "clearance_mean": test.clearance,
-            "whole_lap": test.whole_laps,
-            "starts": test.starts,
-        }
-        row |= {f"{robot} {column}": value for column, value in columns.items()}
-    row |= {
-        "stored": run.scores.stored,
-        "validation": run.scores.validation,
-        "best_stored": float(run.history["best"].max()),
-        "evaluations": int(run.history["evaluations"][-1]),
-        "control_steps": control_steps(run),
-        "path": run.path.as_posix(),
-    }
-    # nan is what the champion's file does not say
-    return {
-        column: None if isinstance(value, float) and math.isnan(value) else value
-        for column, value in row.items()
-    }
+FITNESS = "fitness"
+"""Unit of fitness, until the highest one is known."""
 
 
 def control_steps(run: RunData) -> int | None:
@@ -68,3 +32,124 @@ def control_steps(run: RunData) -> int | None:
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return sum(steps.values()) or None
+
+
+TEST_COLUMNS: Mapping[str, Column[HeldOut]] = {
+    "mean": (lambda test: test.mean, FITNESS, "mean over the test starts"),
+    "standard_deviation": (
+        lambda test: test.standard_deviation,
+        FITNESS,
+        "standard deviation over the test starts",
+    ),
+    "mean_low": (
+        lambda test: test.interval[0],
+        FITNESS,
+        "lower end of the bootstrap 95 % interval of the mean",
+    ),
+    "mean_high": (lambda test: test.interval[1], FITNESS, "its upper end"),
+    "worst": (lambda test: test.worst, FITNESS, "mean of the worst 5 % of the starts"),
+    "crash_rate": (lambda test: test.crash_rate, "share", "share of trials that crash"),
+    "collisions_per_minute": (
+        lambda test: test.collisions_per_minute,
+        "1/min",
+        "crashes per minute of driving",
+    ),
+    "following": (
+        lambda test: test.following,
+        "share",
+        "share of trials of a wall follower or a hugger",
+    ),
+    "clearance_mean": (
+        lambda test: test.clearance,
+        "m",
+        "mean clearance from shell to wall while a wall is near",
+    ),
+    "whole_lap": (
+        lambda test: test.whole_laps,
+        "share",
+        "share of trials that go all round the arena",
+    ),
+    "starts": (lambda test: test.starts, "starts", "number of test starts"),
+}
+"""Columns of a held-out evaluation."""
+
+RUN_COLUMNS: Mapping[str, Column[RunData]] = {
+    "stored": (
+        lambda run: run.scores.stored,
+        FITNESS,
+        "stored fitness of the champion, what evolution believed",
+    ),
+    "validation": (
+        lambda run: run.scores.validation,
+        FITNESS,
+        "the champion on the starts that chose it",
+    ),
+    "best_stored": (
+        lambda run: float(run.history["best"].max()),
+        FITNESS,
+        "highest stored fitness that the run believed in, what the paper reports",
+    ),
+    "evaluations": (
+        lambda run: int(run.history["evaluations"][-1]),
+        "evaluations",
+        "individual evaluations spent",
+    ),
+    "control_steps": (
+        control_steps,
+        "control steps",
+        "those of all trials of the evolution",
+    ),
+    "path": (lambda run: run.path.as_posix(), "", "directory of the run"),
+}
+"""Columns of a run beside its tests."""
+
+
+def run_rows(data: StudyData) -> list[dict[str, Any]]:
+    """A row per run, its columns as `described_columns` says; None: it does not say."""
+    return [
+        _run_row(data, name, run)
+        for name, runs in data.with_runs.items()
+        for run in runs
+    ]
+
+
+def described_columns(data: StudyData) -> list[dict[str, str]]:
+    """What the columns of `run_rows` are, in their order: a row each."""
+    found = {
+        "experiment": ("", "name of the experiment"),
+        "seed": ("", "seed of the run"),
+    }
+    for robot, prefix in _prefixes(data).items():
+        for column, (_, unit, meaning) in TEST_COLUMNS.items():
+            meaning = f"champion on the {robot_name(robot)}: {meaning}"
+            found[f"{prefix}_{column}"] = (unit, meaning)
+    for column, (_, unit, meaning) in RUN_COLUMNS.items():
+        found[column] = (unit, meaning)
+    unit_of = {FITNESS: f"fitness, at most {data.steps}"}
+    return [
+        {"column": column, "unit": unit_of.get(unit, unit), "meaning": meaning}
+        for column, (unit, meaning) in found.items()
+    ]
+
+
+def _prefixes(data: StudyData) -> dict[str, str]:
+    """Begin of the columns of each robot, which may be a user's file."""
+    found: dict[str, str] = {}
+    for robot in shown_robots(data):
+        name = re.sub("[^a-z0-9]+", "_", Path(robot).stem.lower()).strip("_") or "robot"
+        found[robot] = name if name not in found.values() else f"{name}_{len(found)}"
+    return found
+
+
+def _run_row(data: StudyData, name: str, run: RunData) -> dict[str, Any]:
+    row: dict[str, Any] = {"experiment": name, "seed": run.seed}
+    for robot, prefix in _prefixes(data).items():
+        test = run.scores.held_out[robot]
+        for column, (value, _, _) in TEST_COLUMNS.items():
+            row[f"{prefix}_{column}"] = value(test)
+    row |= {column: value(run) for column, (value, _, _) in RUN_COLUMNS.items()}
+    # nan is what the champion's file does not say
+    return {
+        column: None if isinstance(value, float) and math.isnan(value) else value
+        for column, value in row.items()
+    }

@@ -69,7 +69,7 @@ def summary_text(fields: dict[str, Any]) -> str:
 
 def _experiment(data: StudyData, name: str) -> dict[str, Any]:
     found: dict[str, Any] = {
-        "label": label(name),
+        "label": label(data, name),
         "n": len(data.runs[name]),
         "seeds": [run.seed for run in data.runs[name]],
     }

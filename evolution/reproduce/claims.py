@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from epuck_mj.scene.model_files import WHEELED_ROBOT
-from evolution.pages.words import PAPERS, label, median_and_quartiles
+from evolution.pages.words import LABELS, PAPERS, median_and_quartiles
 from evolution.report.measures import held_out_measure, measures
 from evolution.report.samples import FOLLOWED, known
 from evolution.report.sections.comparisons import Comparison, comparisons_of, numbers
@@ -168,7 +168,7 @@ def _orders(
     by_pair, found = {(row.a, row.b): row for row in rows}, []
     for pair in (("de-best", "de-rand"), ("de-best", "ga"), ("de-rand", "ga")):
         better, worse = pair
-        text = f"{label(better)} exceeds {label(worse)} {where}"
+        text = f"{LABELS[better]} exceeds {LABELS[worse]} {where}"
         n = f"{samples[better].size} and {samples[worse].size}"
         row = by_pair.get(pair)
         if row is None:
@@ -181,12 +181,12 @@ def _orders(
 def _maximum(stored: dict[str, np.ndarray], name: str) -> Claim:
     """Claim that an algorithm reaches the paper's maximum."""
     sample, paper = stored[name], PAPER_BEST[name]
-    text = f"{label(name)} reaches a maximum fitness of {paper}"
+    text = f"{LABELS[name]} reaches a maximum fitness of {paper}"
     return _claim(text, sample, lambda: of_best(sample, paper, REPLICATES))
 
 
 def _approaches(shares: dict[str, np.ndarray], name: str) -> Claim:
-    text = f"{label(name)}'s mean approaches its best (read as: above two thirds)"
+    text = f"{LABELS[name]}'s mean approaches its best (read as: above two thirds)"
     sample = shares[name]
     return _claim(text, sample, lambda: of_most(sample > 100 * NEAR), "final share")
 
@@ -200,7 +200,7 @@ def _stays_apart(shares: dict[str, np.ndarray]) -> Claim:
 def _mature_early(early: dict[str, np.ndarray], name: str) -> Claim:
     lenient, strict = EARLY
     text = (
-        f"{label(name)} has mature individuals early (read as: {MATURE:.0%} of its "
+        f"{LABELS[name]} has mature individuals early (read as: {MATURE:.0%} of its "
         f"final best within {lenient:.0%}, and within {strict:.0%}, of the budget)"
     )
     sample = early[name]
@@ -217,7 +217,7 @@ def _mature_early(early: dict[str, np.ndarray], name: str) -> Claim:
 def _follows(study: StudyData, name: str) -> Claim:
     """Claim that champions find and follow walls on wheels without crashing."""
     text = (
-        f"{label(name)}'s champion finds a wall and follows it without crashing "
+        f"{LABELS[name]}'s champion finds a wall and follows it without crashing "
         f"(read as: {FOLLOWED:.0%} of its trials on {WHEELED_ROBOT} are a wall "
         "follower's or a hugger's)"
     )

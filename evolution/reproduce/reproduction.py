@@ -110,7 +110,7 @@ def runs_table(study: StudyData) -> Table:
     columns += [f"held-out, {robot}" for robot in robots]
     rows = [
         [
-            label(name),
+            label(study, name),
             str(len(runs)),
             f"{study.configs[name].evaluations:,}",
             *(spread(study.held_out(name, robot)) for robot in robots),
@@ -169,7 +169,7 @@ def _hidden(study: StudyData) -> list[Block]:
         if stored.size:
             rows.append(
                 [
-                    label(name),
+                    label(study, name),
                     str(len(runs)),
                     spread(stored),
                     spread(held_out),
@@ -207,8 +207,8 @@ def _rungs(study: StudyData) -> list[Block]:
     return [
         Listing(
             [
-                f"{label(name)}: {median_and_quartiles(100 * share, ' %')} of the "
-                f"held-out fitness on {first} is kept on {last}, "
+                f"{label(study, name)}: {median_and_quartiles(100 * share, ' %')} of "
+                f"the held-out fitness on {first} is kept on {last}, "
                 f"n = {share.size}."
                 for name, share in shares.items()
                 if share.size

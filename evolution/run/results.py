@@ -121,7 +121,8 @@ def _draw_fitness(evolution: Evolution, directory: RunDirectory) -> None:
         [record.evaluations for record in records],
         [record.best for record in records],
         [record.mean for record in records],
-        title=f"{evolution.optimizer.name}, seed {evolution.config.seed}",
+        title=f"{evolution.optimizer.name}, seed {evolution.config.seed} "
+        f"(trials per evaluation: {evolution.config.trials})",
         steps=evolution.config.steps,
     )
     save_figure(figure, directory.fitness_figure)

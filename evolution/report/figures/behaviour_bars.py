@@ -73,7 +73,7 @@ def _class_shares(data: StudyData, robot: str) -> dict[str, dict[str, float]]:
     for name, runs in data.with_runs.items():
         shares = class_means(data, name, robot)
         if shares:
-            found[with_count(name, len(runs))] = shares
+            found[with_count(data, name, len(runs))] = shares
     hand_written = data.yardstick.get(robot)
     if hand_written and hand_written.behaviour:
         found[HAND_WRITTEN] = dict(hand_written.behaviour)

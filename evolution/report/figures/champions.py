@@ -29,6 +29,9 @@ from evolution.study.data import StudyData
 MOST_COLUMNS = 3
 """Panels side by side."""
 
+LUCK_AREA = 32
+"""Area of a mark beside its stored fitness [square points]."""
+
 DOT_SPREAD = 0.28
 """Farthest that a run's dot lies from its row, in rows."""
 
@@ -38,11 +41,11 @@ CHAMPION = "A champion's held-out fitness is its mean on the test starts."
 @matplotlib.rc_context(PRINT)
 def stored_and_held_out_figure(data: StudyData) -> tuple[Figure, str]:
     """Held-out against stored fitness of every champion, a panel per experiment."""
-    runs, styles = data.with_runs, looks(data)
+    runs, styles = data.with_runs, looks(data.configs)
     columns = min(len(runs), MOST_COLUMNS)
     rows = -(-len(runs) // columns)
     width = max(COLUMN, PAGE * columns / MOST_COLUMNS)
-    figure = Figure(figsize=(width, 0.4 + 2 * rows), layout="constrained")
+    figure = Figure(figsize=(width, 0.4 + 2.3 * rows), layout="constrained")
     grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
     reference = data.yardstick_mean(data.robots[0])
     for axes in grid.flat[len(runs) :]:
@@ -51,12 +54,12 @@ def stored_and_held_out_figure(data: StudyData) -> tuple[Figure, str]:
         _draw_luck(axes, data, name, styles[name])
         if reference is not None:
             axes.axhline(reference, **YARDSTICK_LOOK, zorder=1)
-        axes.set_title(with_count(name, len(each)))
+        axes.set_title(with_count(data, name, len(each)))
         axes.set(ylim=(0, data.steps), xlabel="runs, in order of stored fitness")
     for axes in grid[:, 0]:
         axes.set_ylabel(f"fitness (max {data.steps})")
-    dot = {"color": "0.3", "ls": "", "marker": "o", "ms": 4}
-    lines = {"stored": Line2D([], [], color="black", ls="", marker="_", ms=6, mew=1.4)}
+    dot = {"color": "0.3", "ls": "", "marker": "o", "ms": 5}
+    lines = {"stored": Line2D([], [], color="black", ls="", marker="_", ms=8, mew=1.6)}
     for robot in data.robots:
         fill = "0.3" if robot == data.robots[0] else "white"
         lines[f"held-out, {robot_name(robot)}"] = Line2D([], [], mfc=fill, **dot)
@@ -84,8 +87,8 @@ def stored_and_held_out_figure(data: StudyData) -> tuple[Figure, str]:
 @matplotlib.rc_context(PRINT)
 def held_out_figure(data: StudyData) -> tuple[Figure, str]:
     """Held-out fitness of every champion, a row per experiment, a panel per robot."""
-    runs, styles = data.with_runs, looks(data)
-    labels = [with_count(name, len(each)) for name, each in runs.items()]
+    runs, styles = data.with_runs, looks(data.configs)
+    labels = [with_count(data, name, len(each)) for name, each in runs.items()]
     figure, panels = robot_panels(data, labels)
     lines = {
         "one run": Line2D([], [], color="0.4", ls="", marker="o", ms=3.5),
@@ -114,7 +117,7 @@ def rungs_figure(data: StudyData) -> tuple[Figure, str] | None:
     if len(data.robots) < 2:
         return None
     first, last = data.robots[0], data.robots[-1]
-    runs, styles = data.with_runs, looks(data)
+    runs, styles = data.with_runs, looks(data.configs)
     figure = Figure(figsize=(COLUMN, 4), layout="constrained")
     axes = figure.add_subplot()
     axes.plot([0, data.steps], [0, data.steps], color="0.5", lw=0.8, zorder=1)
@@ -122,7 +125,7 @@ def rungs_figure(data: StudyData) -> tuple[Figure, str] | None:
     for name, each in runs.items():
         x, y = data.held_out(name, first), data.held_out(name, last)
         axes.scatter(x, y, **_dots(styles[name]))
-        lines[with_count(name, len(each))] = Line2D(
+        lines[with_count(data, name, len(each))] = Line2D(
             [], [], color=styles[name].color, ls="", marker=styles[name].marker, ms=4
         )
     x, y = data.yardstick_mean(first), data.yardstick_mean(last)
@@ -156,19 +159,19 @@ def _draw_luck(axes: Axes, data: StudyData, name: str, look: Look) -> None:
     # held-out fitness may also be the higher one
     everything = np.vstack([tests, stored])
     low, high = everything.min(axis=0), everything.max(axis=0)
-    axes.vlines(rank, low, high, color=look.color, lw=0.6, zorder=2)
-    axes.scatter(rank, stored, marker="_", s=26, color="black", zorder=4)
+    axes.vlines(rank, low, high, color=look.color, lw=0.9, zorder=2)
+    axes.scatter(rank, stored, marker="_", s=40, color="black", lw=1.6, zorder=4)
     # the robot evolved on is filled, and in front
     for i, test in reversed(list(enumerate(tests))):
-        axes.scatter(rank, test, **_dots(look, filled=i == 0))
+        axes.scatter(rank, test, **_dots(look, filled=i == 0, area=LUCK_AREA))
     axes.set(xticks=[], xlim=(-1, order.size))
 
 
-def _dots(look: Look, filled: bool = True) -> dict[str, Any]:
+def _dots(look: Look, filled: bool = True, area: float = 18) -> dict[str, Any]:
     """Arguments of a scatter plot of an experiment's runs."""
     return {
         "marker": look.marker,
-        "s": 18,
+        "s": area,
         "facecolor": look.color if filled else "white",
         "edgecolor": "white" if filled else look.color,
         "linewidths": 0.4 if filled else 0.9,

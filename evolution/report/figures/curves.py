@@ -35,6 +35,11 @@ STORED_NOTE = (
     "Stored fitness is what evolution believes: the mean of the few trials it ran."
 )
 
+RESTARTS_NOTE = (
+    "The population begins anew now and then, in each run at another time, so the mean "
+    "is not drawn. "
+)
+
 
 def on_grid(
     evaluations: np.ndarray, values: np.ndarray, grid: np.ndarray
@@ -72,36 +77,41 @@ def curves(
 
 @matplotlib.rc_context(PRINT)
 def growth_figure(data: StudyData, name: str) -> tuple[Figure, str]:
-    """Population best and mean of an experiment, as in figures 3 to 5 of the paper.
+    """Best so far and population mean of an experiment, as figures 3 to 5 of the paper.
+
+    Populations that begin anew do so in each run at another time, and the median of
+    their means is noise: it is left out.
 
     Raises:
         KeyError: if there is no experiment of that name.
         ValueError: if it has no runs.
     """
-    look, runs = looks(data)[name], data.runs[name]
+    look, runs = looks(data.configs)[name], data.runs[name]
     if not runs:
         raise ValueError(f"expected runs of '{name}', got none")
     grid = common_grid(runs)
     figure = Figure(figsize=(COLUMN, 2.8), layout="constrained")
     axes = figure.add_subplot()
     lines = {}
-    for column, color, dashes in [
-        ("best", look.color, "-"),
-        ("mean", "0.3", (0, (4, 1.5))),
-    ]:
-        values = curves(runs, column, grid)
-        if len(runs) > 1:
-            axes.plot(grid, values.T, color=color, lw=0.4, alpha=0.35)
-        line = _median_and_band(axes, grid, values, color)
-        line.set(linestyle=dashes)
-        lines[f"population {column}"] = line
+    best = curves(runs, "best", grid, so_far=True)
+    if len(runs) > 1:
+        axes.plot(grid, best.T, color=look.color, lw=0.4, alpha=0.35)
+    lines["best so far"] = _median_and_band(axes, grid, best, look.color)
+    anew = len(runs) > 1 and getattr(data.configs[name].optimizer, "restarts", False)
+    if not anew:
+        of_mean = _median_and_band(axes, grid, curves(runs, "mean", grid), "0.45")
+        of_mean.set(linestyle=(0, (4, 1)), linewidth=0.9)
+        lines["population mean"] = of_mean
     of_yardstick = _draw_yardstick(axes, data, lines)
     _stored_axes(axes, data, grid[-1])
-    legend_below(figure, lines, title=with_count(name, len(runs)))
+    legend_below(figure, lines, title=with_count(data, name, len(runs)))
     caption = (
-        f"{label(name)}: stored fitness of the best of the population and its mean "
+        f"{label(data, name)}: best stored fitness so far"
+        f"{'' if anew else ' and mean of the population'} "
         "against evaluations. Median and interquartile range over runs "
-        f"(n = {len(runs)}); thin: the single runs. {STORED_NOTE}{of_yardstick}"
+        f"(n = {len(runs)}); thin: the best so far of each run. "
+        f"{RESTARTS_NOTE if anew else ''}"
+        f"{STORED_NOTE}{of_yardstick}"
     )
     return figure, caption
 
@@ -111,13 +121,13 @@ def growths_figure(data: StudyData) -> tuple[Figure, str]:
     """Best so far of all experiments on one axes."""
     figure = Figure(figsize=(COLUMN, 3.3), layout="constrained")
     axes = figure.add_subplot()
-    lines, styles, runs, last = {}, looks(data), data.with_runs, 0.0
+    lines, styles, runs, last = {}, looks(data.configs), data.with_runs, 0.0
     for i, (name, each) in enumerate(runs.items()):
         grid = common_grid(each)
         best = curves(each, "best", grid, so_far=True)
         line = _median_and_band(axes, grid, best, styles[name].color)
         _mark(line, styles[name], grid.size, i, len(runs))
-        lines[with_count(name, len(each))] = line
+        lines[with_count(data, name, len(each))] = line
         last = max(last, grid[-1])
     of_yardstick = _draw_yardstick(axes, data, lines)
     _stored_axes(axes, data, last)
@@ -134,7 +144,7 @@ def targets_figure(data: StudyData) -> tuple[Figure, str]:
     """Share of all pairs of run and target reached, against evaluations."""
     figure = Figure(figsize=(COLUMN, 3.2), layout="constrained")
     axes = figure.add_subplot()
-    lines, styles, runs = {}, looks(data), data.with_runs
+    lines, styles, runs = {}, looks(data.configs), data.with_runs
     last = max(run.history["evaluations"][-1] for each in runs.values() for run in each)
     budgets = np.linspace(0, last, N_POINTS + 1)
     for i, (name, each) in enumerate(runs.items()):
@@ -143,7 +153,7 @@ def targets_figure(data: StudyData) -> tuple[Figure, str]:
             budgets, share, color=styles[name].color, drawstyle="steps-post"
         )
         _mark(line, styles[name], budgets.size, i, len(runs))
-        lines[with_count(name, len(each))] = line
+        lines[with_count(data, name, len(each))] = line
     count_evaluations(axes, last)
     axes.set(ylabel="share of (run, target) pairs", ylim=(0, 1.02))
     legend_below(figure, lines)

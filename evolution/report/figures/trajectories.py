@@ -1,4 +1,6 @@
-"""The figure of where champions go: trials of the paper's experiments, on wheels."""
+"""The figure of where champions go: trials of every experiment, on wheels."""
+
+from textwrap import fill
 
 import matplotlib
 import numpy as np
@@ -12,67 +14,72 @@ from epuck_mj.show.figures import trajectory_figure
 from epuck_mj.trials.recorder import record
 from evolution.judging.held_out_starts import starts_for_test
 from evolution.pages.style import PAGE, PRINT, with_count
-from evolution.pages.words import PAPERS, label
+from evolution.pages.words import label
 from evolution.settings.config import ExperimentConfig
 from evolution.study.data import RunData, StudyData
 
 TRIALS_SHOWN = 2
 """Trials shown of each champion."""
 
-MOST_CHAMPIONS = 3
-"""Most champions shown where none of the paper's experiments is there."""
+TITLE_WIDTH = 22
+"""Letters that have room above a panel."""
+
+MOST_COLUMNS = 2 * TRIALS_SHOWN
+"""Panels side by side: the trials of two champions."""
 
 
 @matplotlib.rc_context(PRINT)
 def trajectories_figure(data: StudyData) -> tuple[Figure, str]:
-    """Two trials of the median champion of the paper's experiments, on wheels.
+    """Two trials of the median champion of each experiment, on wheels.
 
-    Any other experiments stand in if none of the paper's has runs. Those in another
-    arena than the first, or with another fitness, are left out.
+    Experiments in another arena than the first, or with another fitness, are left out
+    and named in the caption.
 
     Raises:
         UserError: if the wheeled robot cannot use the arena.
     """
     runs = data.with_runs
-    shown = [name for name in PAPERS if name in runs] or list(runs)[:MOST_CHAMPIONS]
     # one picture has one arena and one kind of fitness
-    config = data.configs[shown[0]]
-    scene = load_scene(WHEELED_ROBOT, config.arena, config.control_step)
-    shown = [name for name in shown if _same_world(data.configs[name], config)]
+    first = data.configs[next(iter(runs))]
+    scene = load_scene(WHEELED_ROBOT, first.arena, first.control_step)
+    shown = [name for name in runs if _same_world(data.configs[name], first)]
     trials, titles, who = [], [], []
     for name in shown:
         config, run = data.configs[name], median_run(data, name)
         starts = starts_for_test(FreeSpace(scene, config.start_clearance), TRIALS_SHOWN)
         policy = run.champion.controller
-        trials.append([record(scene, policy, start, config.task) for start in starts])
-        titles.append(
-            [
-                f"{label(name)}, seed {run.seed}\n"
-                f"start {i}: fitness {trial.trial_fitness:.0f}"
-                for i, trial in enumerate(trials[-1])
-            ]
-        )
-        who.append(f"seed {run.seed} of {with_count(name, len(runs[name]))}")
-    # a column each
+        found = [record(scene, policy, start, config.task) for start in starts]
+        trials += found
+        titles += [
+            f"{fill(label(data, name), TITLE_WIDTH)}\n"
+            f"seed {run.seed}, start {i}\nfitness {trial.trial_fitness:.0f}"
+            for i, trial in enumerate(found)
+        ]
+        who.append(f"seed {run.seed} of {with_count(data, name, len(runs[name]))}")
     figure = trajectory_figure(
-        scene,
-        [trial for start in zip(*trials, strict=True) for trial in start],
-        config.task,
-        [title for start in zip(*titles, strict=True) for title in start],
+        scene, trials, first.task, titles, min(MOST_COLUMNS, len(trials))
     )
-    width, height = figure.get_size_inches()
-    # letters do not shrink with the panels: room for the titles
-    figure.set_size_inches(PAGE, height * PAGE / width + 0.4)
-    for axes in figure.axes:
+    # letters do not shrink with the panels: room for titles, axis and legend
+    rows = -(-len(trials) // MOST_COLUMNS)
+    lines = sum(title.count("\n") + 1 for title in titles[::MOST_COLUMNS])
+    figure.set_size_inches(PAGE, 1.5 * rows + 0.14 * lines + 0.75)
+    *panels, _ = figure.axes
+    for axes in panels:
         axes.grid(visible=False)
-        axes.locator_params(nbins=5)
+        axes.locator_params(nbins=3)
     _rasterise_paths(figure)
     caption = (
         "Trajectories of champions on the wheeled robot from the first "
         f"{TRIALS_SHOWN} test starts; of each experiment the median run by held-out "
-        f"fitness there: {'; '.join(who)}. Circle: start; outline: where the robot "
-        "ended; cross: crash."
+        f"fitness there: {'; '.join(who)}. Small circle: start; outline: the robot "
+        "where it ended; cross: crash."
     )
+    others = [label(data, name) for name in runs if name not in shown]
+    if others:
+        caption += (
+            " Not drawn, since arena, control step or fitness are others: "
+            f"{', '.join(others)}."
+        )
     return figure, caption
 
 

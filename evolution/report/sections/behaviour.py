@@ -1,6 +1,7 @@
 """Behaviour: what champions do, and how close to the wall they ride."""
 
 import math
+from collections.abc import Sequence
 
 from epuck_mj.trials.behaviour_classes import HUG, MEANINGS
 from epuck_mj.trials.metrics import FOLLOWING_SHARE
@@ -21,45 +22,18 @@ from evolution.study.data import StudyData
 
 def behaviour_section(data: StudyData) -> list[Block]:
     """What champions do, and how close to the wall they ride."""
-    shares = {
-        (name, robot): class_means(data, name, robot)
+    shares = [
+        class_means(data, name, robot)
         for robot in shown_robots(data)
         for name in data.with_runs
-    }
-    classes = dict.fromkeys(name for each in shares.values() for name in each)
-    seen = [c for c in classes if any(each.get(c) for each in shares.values())]
+    ]
+    classes = dict.fromkeys(name for each in shares for name in each)
+    seen = [c for c in classes if any(each.get(c) for each in shares)]
     if not seen:
         return [
             Heading("Behaviour"),
             Paragraph("Not known: no run has behaviour classes."),
         ]
-    rows = []
-    for (name, robot), each in shares.items():
-        near = clearances(data, name, robot)
-        rows.append(
-            (
-                label(name),
-                robot_name(robot),
-                *(percent(each.get(c, 0.0) if each else None) for c in seen),
-                spread(near, 1000),
-                f"{(near < HUG).sum()} of {near.size}",
-                percent_median(whole_laps(data, name, robot)),
-            )
-        )
-    for robot in shown_robots(data):
-        test = data.yardstick.get(robot)
-        if test and test.behaviour:
-            near = test.clearance
-            rows.append(
-                (
-                    YARDSTICK_LABEL,
-                    robot_name(robot),
-                    *(percent(test.behaviour.get(c, 0.0)) for c in seen),
-                    NOTHING if math.isnan(near) else f"{near * 1000:.1f}",
-                    NOTHING,
-                    percent(test.whole_laps),
-                )
-            )
     return [
         Heading("Behaviour"),
         Paragraph(
@@ -77,16 +51,50 @@ def behaviour_section(data: StudyData) -> list[Block]:
             "time for one: at top speed the 30 s of the paper's experiments are 3.9 m, "
             "once round its arena is 3.5 m, and the first wall has to be found."
         ),
-        Table(
-            (
-                "experiment",
-                "robot",
-                *seen,
-                "clearance [mm]",
-                f"below {HUG * 1000:.0f} mm",
-                "whole lap",
-            ),
-            rows,
-            texts=2,
+        *(
+            block
+            for robot in shown_robots(data)
+            for block in (
+                Heading(f"Behaviour, {robot_name(robot)}", 3),
+                _table(data, robot, seen),
+            )
         ),
     ]
+
+
+def _table(data: StudyData, robot: str, seen: Sequence[str]) -> Table:
+    """Behaviour on a robot: a row per experiment, the follower written by hand last."""
+    rows = []
+    for name in data.with_runs:
+        shares, near = class_means(data, name, robot), clearances(data, name, robot)
+        rows.append(
+            (
+                label(data, name),
+                *(percent(shares.get(c, 0.0) if shares else None) for c in seen),
+                spread(near, 1000),
+                f"{(near < HUG).sum()} of {near.size}",
+                percent_median(whole_laps(data, name, robot)),
+            )
+        )
+    test = data.yardstick.get(robot)
+    if test and test.behaviour:
+        near = test.clearance
+        rows.append(
+            (
+                YARDSTICK_LABEL,
+                *(percent(test.behaviour.get(c, 0.0)) for c in seen),
+                NOTHING if math.isnan(near) else f"{near * 1000:.1f}",
+                NOTHING,
+                percent(test.whole_laps),
+            )
+        )
+    return Table(
+        (
+            "experiment",
+            *(f"{each} [%]" for each in seen),
+            "clearance [mm]",
+            f"runs below {HUG * 1000:.0f} mm",
+            "whole lap [%]",
+        ),
+        rows,
+    )

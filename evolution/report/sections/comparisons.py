@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
-from evolution.pages.words import between, label, probability, robot_name
+from evolution.pages.words import between, label, numbered, probability, robot_name
 from evolution.report.contests import Contest, contests
 from evolution.report.measures import (
     generator,
@@ -129,8 +129,9 @@ def comparisons_section(data: StudyData) -> list[Block]:
     blocks.append(
         Paragraph(
             "Two-sided Mann-Whitney tests over runs; Holm's adjustment within each "
-            f"table ({own[0].family} pairs). A12 is the probability that a run of the "
-            "first exceeds one of the second (0.5: no effect), with a 95 % interval; "
+            f"table ({numbered(own[0].family, 'pair')}). A12 is the probability that "
+            "a run of the first exceeds one of the second (0.5: no effect), with a "
+            "95 % interval; "
             "the difference of medians has a bootstrap 95 % interval. Below "
             f"{FEWEST_FOR_INTERVAL} runs there are no intervals, which would not hold "
             f"their 95 %; below {FEWEST_FOR_STARS} no stars and no verdict."
@@ -138,32 +139,45 @@ def comparisons_section(data: StudyData) -> list[Block]:
     )
     blocks += [
         Paragraph(f"In held-out fitness on the {robot_name(first)}:"),
-        Listing([compared(pair, label(pair.a), label(pair.b)) for pair in own]),
+        Listing(
+            [compared(pair, label(data, pair.a), label(data, pair.b)) for pair in own]
+        ),
     ]
     for measure, pairs in found.items():
-        blocks += [Heading(measure_title(measure, data), 3), _pair_table(pairs)]
+        blocks += [Heading(measure_title(measure, data), 3), _pair_table(data, pairs)]
     return blocks
 
 
-def _pair_table(pairs: Sequence[Comparison]) -> Table:
-    columns = ("first", "second", "n", "medians", "difference", "A12", "p", "Holm", "")
+def _pair_table(data: StudyData, pairs: Sequence[Comparison]) -> Table:
+    unit = f"[of {data.steps}]"
     return Table(
-        columns,
+        (
+            *("first, second", "runs", f"medians {unit}", f"difference {unit}"),
+            *("A12", "p", "Holm p", "stars"),
+        ),
         [
             (
-                label(pair.a),
-                label(pair.b),
+                f"{label(data, pair.a)}, {label(data, pair.b)}",
                 f"{pair.of_a.size}, {pair.of_b.size}",
                 f"{np.median(pair.of_a):.1f}, {np.median(pair.of_b):.1f}",
-                f"{pair.shift.value:z.1f} {between(pair.shift, '.1f')}",
-                f"{pair.a12.value:.2f} {between(pair.a12)}",
+                _with_bounds(pair.shift, ".1f"),
+                _with_bounds(pair.a12, ".2f"),
                 probability(pair.p).removeprefix("= "),
                 probability(pair.p_holm).removeprefix("= "),
                 PAIR_COLUMNS["stars"](pair),
             )
             for pair in pairs
         ],
-        texts=2,
+    )
+
+
+def _with_bounds(found: Interval, form: str) -> str:
+    """A value, and its bounds if there are any."""
+    value = f"{found.value:z{form}}"
+    return (
+        value
+        if math.isnan(found.low)
+        else f"{value} {between(found, form.lstrip('z'))}"
     )
 
 

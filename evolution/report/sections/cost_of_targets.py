@@ -84,15 +84,15 @@ def cost_of_targets_section(data: StudyData) -> list[Block]:
         Heading("Cost of targets"),
         Paragraph(
             "Expected running time in individual evaluations, if whoever fails starts "
-            "again, and the runs that reached the target (none: not within any run's "
-            "budget). Targets are of stored "
-            "fitness, the only one that a history has, so luck counts here. Intervals "
-            "are in targets.csv."
+            "again, and in brackets how many of the runs reached the target (none: not "
+            "within any run's budget). A column per target: a stored fitness, the only "
+            f"one that a history has, of at most {data.steps}. So luck counts here. "
+            "Intervals are in targets.csv."
         ),
         Table(
-            ("experiment", *(f"{goal:g}" for goal in goals)),
+            ("experiment", *(f"to {goal:.3g} [evaluations]" for goal in goals)),
             [
-                (label(name), *(_cost(found[name, goal]) for goal in goals))
+                (label(data, name), *(_cost(found[name, goal]) for goal in goals))
                 for name in data.with_runs
             ],
         ),

@@ -18,7 +18,7 @@ def from_rung_to_rung_section(data: StudyData) -> list[Block]:
         rank = rank_correlation(a, b)
         rows.append(
             (
-                label(name),
+                label(data, name),
                 str(len(runs)),
                 spread(a),
                 spread(b),
@@ -35,5 +35,15 @@ def from_rung_to_rung_section(data: StudyData) -> list[Block]:
             "Rank correlation: Spearman's over runs, given from "
             f"{FEWEST_FOR_RANKS} runs on."
         ),
-        Table(("experiment", "n", one, other, "kept", "rank correlation"), rows),
+        Table(
+            (
+                "experiment",
+                "runs",
+                f"{one}: held-out [of {data.steps}]",
+                f"{other}: held-out [of {data.steps}]",
+                "kept [%]",
+                "rank correlation",
+            ),
+            rows,
+        ),
     ]

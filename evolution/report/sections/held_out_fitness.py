@@ -23,7 +23,7 @@ def held_out_fitness_section(data: StudyData) -> list[Block]:
     robots = shown_robots(data)
     rows = []
     for name, runs in data.with_runs.items():
-        row = [label(name), str(len(runs))]
+        row = [label(data, name), str(len(runs))]
         for robot in robots:
             sample = data.held_out(name, robot)
             crashes = crash_rates(tests_of(data, name, robot))
@@ -35,9 +35,15 @@ def held_out_fitness_section(data: StudyData) -> list[Block]:
             test = data.yardstick[robot]
             row += [f"{test.mean:.1f}", NOTHING, percent(test.crash_rate)]
         rows.append([*row, NOTHING])
-    columns = ["experiment", "n"]
+    unit = f"[of {data.steps}]"
+    columns = ["experiment", "runs"]
     for robot in robots:
-        columns += [f"held-out, {robot_name(robot)}", "best run", "crashes"]
+        who = robot_name(robot)
+        columns += [
+            f"{who}: held-out {unit}",
+            f"{who}: best run {unit}",
+            f"{who}: crashes [%]",
+        ]
     return [
         Heading("Held-out fitness"),
         Paragraph(
@@ -47,7 +53,7 @@ def held_out_fitness_section(data: StudyData) -> list[Block]:
             "chosen for being high. It is what the paper reports, and seldom the "
             "champion's."
         ),
-        Table([*columns, "best stored"], rows),
+        Table([*columns, f"best stored {unit}"], rows),
         *_as_evolved(data),
     ]
 
@@ -59,7 +65,7 @@ def _as_evolved(data: StudyData) -> list[Block]:
         found = [run.scores.held_out_as_evolved for run in runs]
         tests = [each for each in found if each]
         if tests:
-            row = [label(name), str(len(tests))]
+            row = [label(data, name), str(len(tests))]
             for robot in shown_robots(data):
                 on_robot = [each[robot] for each in tests]
                 row.append(spread(np.array([test.mean for test in on_robot])))
@@ -67,9 +73,10 @@ def _as_evolved(data: StudyData) -> list[Block]:
             rows.append(row)
     if not rows:
         return []
-    columns = ["experiment", "n"]
+    columns = ["experiment", "runs"]
     for robot in shown_robots(data):
-        columns += [f"held-out, {robot_name(robot)}", "crashes"]
+        who = robot_name(robot)
+        columns += [f"{who}: held-out [of {data.steps}]", f"{who}: crashes [%]"]
     return [
         Paragraph(
             "The same with the disturbances that they evolved with: noise, and where "

@@ -74,7 +74,8 @@ def how_to_get_every_number_again_section(
         Heading("How to get every number again"),
         Listing(
             [
-                "runs.csv: every run. Tables of this page are made of it, "
+                "runs.csv: every run; runs-columns.csv: what its columns mean, and "
+                "their units. Tables of this page are made of it, "
                 "pairwise.csv, success.csv and targets.csv; summary.json has all.",
                 *(["ioh/: the histories, for IOHanalyzer."] if ioh else []),
                 "Random numbers of intervals are drawn from a fixed seed: the same "
@@ -106,7 +107,7 @@ def how_to_get_every_number_again_section(
         blocks += [
             Paragraph("The experiments differ in these keys:"),
             Table(
-                ("key", *(label(name) for name in names)),
+                ("key", *(label(data, name) for name in names)),
                 [
                     (key, *(str(values.get(name, NOTHING)) for name in names))
                     for key, values in differing.items()

@@ -7,7 +7,13 @@ from typing import Any
 import numpy as np
 
 from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
-from evolution.pages.words import YARDSTICK_LABEL, label, probability, robot_name
+from evolution.pages.words import (
+    YARDSTICK_LABEL,
+    label,
+    numbered,
+    probability,
+    robot_name,
+)
 from evolution.report.contests import Contest, contests
 from evolution.report.measures import shown_robots
 from evolution.report.samples import FOLLOWED
@@ -143,16 +149,19 @@ def success_section(data: StudyData) -> list[Block]:
             continue
         blocks += [
             Paragraph(f"A run {criterion}: {meaning}. Share with Wilson 95 % bounds."),
-            _success_table(found),
+            _success_table(data, found),
         ]
         pairs = [(each.robot, pair) for each in found for pair in each.pairs]
         if pairs:
-            (_, first), *_ = pairs
-            decided = [_fisher(robot, pair) for robot, pair in pairs if pair.decided]
+            n = pairs[0][1].family
+            decided = [
+                _fisher(data, robot, pair) for robot, pair in pairs if pair.decided
+            ]
             blocks += [
                 Paragraph(
-                    f"Fisher's exact test of the {first.family} pairs of a robot, "
-                    "Holm-adjusted within them; pairs that differ with p < "
+                    "Fisher's exact test of each pair of experiments on a robot, "
+                    f"Holm-adjusted within the robot's ({numbered(n, 'pair')}); pairs "
+                    "that differ with p < "
                     f"{LEVELS[0]}, of {FEWEST_FOR_STARS} runs each at least (all: "
                     "success.csv):"
                 ),
@@ -161,21 +170,29 @@ def success_section(data: StudyData) -> list[Block]:
     return blocks
 
 
-def _fisher(robot: str, pair: Contest) -> str:
+def _fisher(data: StudyData, robot: str, pair: Contest) -> str:
     return (
-        f"{label(pair.a)} and {label(pair.b)}, {robot_name(robot)}: "
+        f"{label(data, pair.a)} and {label(data, pair.b)}, {robot_name(robot)}: "
         f"{pair.of_a.sum()} of {pair.of_a.size} and "
         f"{pair.of_b.sum()} of {pair.of_b.size}, Holm p {probability(pair.p_holm)}"
     )
 
 
-def _success_table(found: Sequence[Outcomes]) -> Table:
-    rows = []
+def _success_table(data: StudyData, found: Sequence[Outcomes]) -> Table:
+    """A row per experiment, columns per robot."""
+    columns = ["experiment"]
     for each in found:
-        for name, met in each.met.items():
-            share = each.share(name)
-            bounds = f"[{share.low:.0%}, {share.high:.0%}]"
-            runs = f"{met.sum()} of {met.size}"
-            shares = f"{share.value:.0%} {bounds}"
-            rows.append((label(name), robot_name(each.robot), runs, shares))
-    return Table(("experiment", "robot", "runs", "share"), rows, texts=2)
+        who = robot_name(each.robot)
+        columns += [f"{who}: runs", f"{who}: share [%]"]
+    rows = []
+    for name in data.with_runs:
+        row = [label(data, name)]
+        for each in found:
+            met, share = each.met[name], each.share(name)
+            low, high = 100 * share.low, 100 * share.high
+            row += [
+                f"{met.sum()} of {met.size}",
+                f"{100 * share.value:.0f} [{low:.0f}, {high:.0f}]",
+            ]
+        rows.append(row)
+    return Table(columns, rows)

@@ -13,6 +13,14 @@ WITH_NOISE = (
 )
 
 
+FITNESSES = (
+    *("champion: stored", "champion: held-out", "champion: luck"),
+    *("most believed: stored", "most believed: held-out", "most believed: luck"),
+    "regained",
+)
+"""Columns of fitness."""
+
+
 def what_stored_fitness_promised_section(data: StudyData) -> list[Block]:
     """What stored fitness promised and fresh starts did not keep."""
     robot = data.robots[0]
@@ -26,7 +34,7 @@ def what_stored_fitness_promised_section(data: StudyData) -> list[Block]:
         both = held_out[tested].size == worth.size
         rows.append(
             (
-                label(name),
+                label(data, name),
                 str(len(runs)),
                 spread(stored),
                 spread(held_out[tested]),
@@ -48,8 +56,9 @@ def what_stored_fitness_promised_section(data: StudyData) -> list[Block]:
         ),
         Table(
             (
-                *("experiment", "n", "champion, stored", "held-out", "luck"),
-                *("most believed, stored", "held-out", "luck", "regained"),
+                "experiment",
+                "runs",
+                *(f"{each} [of {data.steps}]" for each in FITNESSES),
             ),
             rows,
         ),

@@ -1,9 +1,18 @@
 """What was run: title, what is missing, and the experiments."""
 
+import math
+
 import numpy as np
 
 from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
-from evolution.pages.words import NOTHING, evaluations, label, robot_name, spread
+from evolution.pages.words import (
+    NOTHING,
+    evaluations,
+    label,
+    numbered,
+    robot_name,
+    spread,
+)
 from evolution.report.measures import shown_robots
 from evolution.report.run_table import control_steps
 from evolution.report.samples import tests_of
@@ -36,8 +45,10 @@ def what_was_run_section(data: StudyData) -> list[Block]:
         blocks.append(Listing(data.missing))
     else:
         blocks.append(Paragraph("Nothing: all runs that were begun are finished."))
+    taken = {name: _steps(data, name) for name in data.configs}
+    scale, unit, units = scale_of(np.concatenate(list(taken.values())))
     if sizes[0] < 2:
-        few = [label(name) for name, each in runs.items() if len(each) < 2]
+        few = [label(data, name) for name, each in runs.items() if len(each) < 2]
         blocks.append(
             Paragraph(
                 f"Only one run of {', '.join(few)}: one run has a value but says "
@@ -47,8 +58,9 @@ def what_was_run_section(data: StudyData) -> list[Block]:
     blocks += [
         Heading("What was run"),
         Paragraph(
-            f"{sum(len(each) for each in runs.values())} finished runs of "
-            f"{len(runs)} experiments. Evolved on the {robot_name(data.robots[0])}. "
+            f"{numbered(sum(map(len, runs.values())), 'finished run')} of "
+            f"{numbered(len(runs), 'experiment')}. "
+            f"Evolved on the {robot_name(data.robots[0])}. "
             f"Each run's champion is tested on {n_starts} test starts, the same for "
             "all and never seen by evolution, with ideal sensors and motors, on the "
             f"{' and the '.join(map(robot_name, shown_robots(data)))}. The unit is "
@@ -56,19 +68,20 @@ def what_was_run_section(data: StudyData) -> list[Block]:
         ),
         Table(
             (
-                *("experiment", "name", "seeds", "n", "budget", "trials", "spent"),
-                "control steps",
+                *("experiment", "name", "seeds", "runs", "budget [evaluations]"),
+                *("spent [evaluations]", "trials per evaluation"),
+                f"control steps{f' [{unit}]' if unit else ''}",
             ),
             [
                 (
-                    label(name),
+                    label(data, name),
                     name,
                     seeds_text([run.seed for run in data.runs[name]]) or NOTHING,
                     str(len(data.runs[name])),
                     f"{config.evaluations:,}",
-                    str(config.trials),
                     _spent(data, name),
-                    _steps(data, name),
+                    str(config.trials),
+                    spread(taken[name] / scale, form="z,.1f" if unit else "z,.0f"),
                 )
                 for name, config in data.configs.items()
             ],
@@ -76,8 +89,9 @@ def what_was_run_section(data: StudyData) -> list[Block]:
         ),
         Paragraph(
             "Budget and spent are individual evaluations, each of that many trials; a "
-            "run spends whole generations only. Control steps of a run are in "
-            f"millions, median [quartiles]; {data.steps} a trial at most, fewer for "
+            "run spends whole generations only. Control steps are those of a run"
+            f"{f', in {units}' if unit else ''}, median [quartiles]; "
+            f"{data.steps} a trial at most, fewer for "
             "robots that crash, and where racing breaks off who can only lose. "
             "Choosing the champion comes on top, for every algorithm: "
             f"{_validation_starts(data)} trials of each candidate, which are the best "
@@ -99,6 +113,15 @@ def _spent(data: StudyData, name: str) -> str:
     return evaluations(max(spent, default=None))
 
 
-def _steps(data: StudyData, name: str) -> str:
+def _steps(data: StudyData, name: str) -> np.ndarray:
+    """Control steps of the runs that counted them, `(n,)`."""
     counted = [control_steps(run) for run in data.runs[name]]
-    return spread(np.array([steps for steps in counted if steps], float), 1e-6)
+    return np.array([steps for steps in counted if steps], float)
+
+
+def scale_of(numbers: np.ndarray) -> tuple[float, str, str]:
+    """A scale in which the smallest of `(n,)` is no zero, its sign and its name."""
+    smallest = numbers.min(initial=math.inf)
+    if 1e5 <= smallest < math.inf:
+        return 1e6, "M", "millions"
+    return (1e3, "k", "thousands") if 1e3 <= smallest < math.inf else (1.0, "", "")
