@@ -128,7 +128,11 @@ def trajectory_figure(
     for axes in panels.flat[len(trajectories) :]:
         axes.remove()
     figure.colorbar(
-        path, ax=used, label=f"step fitness ({task.fitness})", shrink=0.8, aspect=25
+        path,
+        ax=used,
+        label=f"step fitness ({task.fitness.rpartition(':')[2]})",
+        shrink=0.8,
+        aspect=25,
     )
     marks = [
         Line2D([], [], ls="", label="start", **START),

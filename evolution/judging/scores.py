@@ -136,14 +136,13 @@ class Scores(_Record, frozen=True):
             lines.append(f"With the disturbances it evolved with: {disturbed}")
         lines.append(
             f"Evolution stored {self.stored:.1f} for it, from the few starts of its "
-            "own trials"
+            "own trials, which may have been easy ones"
         )
-        if self.most_believed is not None:
-            stored, held_out = self.most_believed.stored, self.most_believed.held_out
+        best = self.most_believed
+        if best is not None and best.stored != self.stored:
             lines.append(
-                f"The highest fitness that evolution stored, {stored:.1f}, is what an "
-                f"individual earned on its luckiest few starts: fresh ones give it "
-                f"{held_out:.1f}"
+                f"The highest fitness that evolution stored was {best.stored:.1f}, of "
+                f"an individual that fresh starts give {best.held_out:.1f}"
             )
         return "\n".join(lines)
 

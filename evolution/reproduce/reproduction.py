@@ -129,7 +129,7 @@ def medians_table(study: StudyData, robot: str) -> Table:
     """Medians over the runs of every experiment with runs, for a reader in a hurry."""
     rows = [
         [
-            label(name),
+            label(study, name),
             str(len(runs)),
             f"{np.median(study.held_out(name, robot)):.0f}",
             f"{np.median(study.best_stored(name)):.0f}",
