@@ -15,7 +15,7 @@ from epuck_mj.policies.network import Network
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters
-from epuck_mj.trials.recorder import record
+from epuck_mj.trials.recorder import record, record_trajectories
 from epuck_mj.trials.trajectory import Trajectory
 from evolution.judging.held_out_starts import (
     held_out_disturbances,
@@ -124,9 +124,10 @@ def test_a_champion_is_shown_as_it_evolved_unless_asked_otherwise(champion, here
     fields = load_config(find_config("ga-randomised")).model_dump() | {"steps": STEPS}
     text = ExperimentConfig.parsed(fields, "test").to_yaml()
     (here / "run" / "config.yaml").write_text(text)
-    evolved = shown(champion)
+    first = ("--starts", "test:0")
+    evolved = shown(champion, *first)
     assert "noise calibrated, other robots" in evolved.summary
-    asked = shown(champion, "--noise", "calibrated", "--randomise")
+    asked = shown(champion, "--noise", "calibrated", "--randomise", *first)
     for name, poses in evolved.poses.items():
         np.testing.assert_array_equal(poses, asked.poses[name])
     ideal = shown(champion, "--noise", "none")
@@ -159,7 +160,7 @@ def test_without_a_display_the_recording_is_beside_the_champion(
     assert replay([champion]) == 0
     out, err = capfd.readouterr()
     outcome, line = out.splitlines()
-    assert re.fullmatch(r"run/champion\.json: fitness \d\.\d of 8", outcome)
+    assert re.fullmatch(r"run/champion\.json: fitness \d\.\d of 8 \(start test:15, .*", outcome)
     path = here / "run" / "replay.rrd"
     assert re.fullmatch(
         rf"{path}; there is no display here; watch it: \S+ -m rerun {path}", line
@@ -173,14 +174,28 @@ def test_without_a_display_the_recording_is_beside_the_champion(
 
 
 def test_the_trial_is_the_one_that_anybody_can_repeat(champion, here, capsys):
-    recording = shown(champion)
+    recording = shown(champion, "--starts", "test:0")
     policy, task = load_controller(champion).controller, TaskParameters(steps=STEPS)
     start = starts_for_test(FreeSpace(load_scene("epuck", "arena"), 0.01), 1)[0]
     trajectory = record(load_scene("epuck", "arena"), policy, start, task)
     (poses,) = recording.poses.values()
     np.testing.assert_allclose(poses, trajectory.pose[:, :2], atol=1e-6)
-    said = f"fitness {trajectory.trial_fitness:.1f} of 8\n"
+    said = f"fitness {trajectory.trial_fitness:.1f} of 8"
     assert said in capsys.readouterr().out
+
+
+def test_the_trial_of_median_fitness_is_shown_first(champion, here, capsys):
+    (poses,) = shown(champion).poses.values()
+    out = capsys.readouterr().out
+    scene, task = load_scene("epuck", "arena"), TaskParameters(steps=STEPS)
+    starts = starts_for_test(FreeSpace(scene, 0.01), 25)
+    policy = load_controller(champion).controller
+    trials = record_trajectories(scene, policy, starts, task)
+    order = np.argsort([trial.trial_fitness for trial in trials], kind="stable")
+    typical = trials[order[12]]
+    np.testing.assert_allclose(poses, typical.pose[:, :2], atol=1e-6)
+    where = f"(start test:{order[12]}, median fitness of the first 25)"
+    assert where in out
 
 
 def test_a_run_directory_and_its_file_are_the_same_champion(champion, here):

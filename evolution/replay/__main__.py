@@ -41,8 +41,12 @@ def replay(argv: Sequence[str]) -> int:
     scene = scene_for(options, policies)
     starts = starts_for(options, scene, policies)
     trials = [*simulated(scene, policies, starts, conditions), *recorded]
+    where = ""
+    if starts.typical_of:
+        among = f"median fitness of the first {starts.typical_of}"
+        where = f" (start test:{starts.first}, {among})"
     for trial in trials:
-        print(outcome(trial))
+        print(f"{outcome(trial)}{where if trial not in recorded else ''}")
     title = ", ".join(labels(policies) or [trial.name for trial in recorded])
     text = text_panel(trials, policies)
     show(options, Replay(scene, trials, title, text), paths[0])

@@ -3,16 +3,19 @@
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from epuck_mj.errors import UserError
+from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.geometry import arena_box
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.conditions import Conditions
+from epuck_mj.step.control import Everybody
 from epuck_mj.step.disturbances import Disturbances
+from epuck_mj.trials.recorder import record_tracks
 from evolution.judging.held_out_starts import (
     held_out_disturbances,
     starts_for_test,
@@ -22,6 +25,9 @@ from evolution.named_policies import NamedPolicy
 from evolution.replay.options import Options
 from evolution.settings.config_fields import N_TEST, N_VALIDATION
 from evolution.settings.randomness import Purpose
+
+N_TRIED = 25
+"""Test starts among which the one of median fitness is shown."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +39,15 @@ class Starts:
         poses: `(n, 3)`: x, y [m], yaw [rad].
         purpose: of the held-out starts that they are among.
         first: number of the first among them.
+        typical_of: among how many the first policy has its median fitness here; 0 if
+            the starts were asked for.
     """
 
     names: tuple[str, ...]
     poses: np.ndarray
     purpose: Purpose = Purpose.TEST
     first: int = 0
+    typical_of: int = 0
 
     def met(self, conditions: Conditions, steps: int) -> Disturbances | None:
         """Disturbances of trials from these starts, as in the held-out test."""
@@ -119,16 +128,42 @@ def starts_for(
             )
         # it meets what test start 0 does
         return Starts(("pose",), _pose(scene, *options.pose)[None])
-    trials = 1 if options.trials is None else options.trials
-    if trials < 1:
-        raise UserError(f"expected at least 1 trial, got {trials}")
+    if options.trials is not None and options.trials < 1:
+        raise UserError(f"expected at least 1 trial, got {options.trials}")
     if not policies:
         # recorded trajectories have none
         return Starts((), np.zeros((0, 3)))
     # the widest: a start that is free for one is free for all
     clearance = max(policy.start_clearance for policy in policies)
-    spec = options.starts or f"test:0-{trials - 1}"
-    return numbered_starts(spec, scene, clearance)
+    if options.starts is not None:
+        return numbered_starts(options.starts, scene, clearance)
+    if options.trials is not None:
+        return numbered_starts(f"test:0-{options.trials - 1}", scene, clearance)
+    number = typical_start(scene, policies[0], clearance, options.robots.conditions)
+    starts = numbered_starts(f"test:{number}", scene, clearance)
+    return replace(starts, typical_of=N_TRIED)
+
+
+def typical_start(
+    scene: Scene,
+    policy: NamedPolicy,
+    clearance: float,
+    conditions: Conditions | None = None,
+) -> int:
+    """Number of the start of median fitness, among the first test starts.
+
+    Args:
+        scene: robot and arena.
+        policy: that drives.
+        clearance: least distance from the shell to a wall at a start [m].
+        conditions: of the robots; None for those that the policy evolved with.
+    """
+    starts = numbered_starts(f"test:0-{N_TRIED - 1}", scene, clearance)
+    met = starts.met(conditions or policy.conditions, policy.task.steps)
+    robots, everybody = robots_in(scene, N_TRIED), Everybody(policy.policy)
+    tracks = record_tracks(robots, everybody, starts.poses, policy.task, met)
+    order = np.argsort(tracks.trial_fitness, kind="stable")
+    return int(order[N_TRIED // 2])
 
 
 def _pose(scene: Scene, x: float, y: float, degrees: float) -> np.ndarray:

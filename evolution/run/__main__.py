@@ -17,6 +17,7 @@ from epuck_mj.host.command_line import check_threads, main, parse, shell_command
 from epuck_mj.host.interruption import Interrupted, Interruption
 from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
+from evolution.run.progress import Progress
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import DEFAULT_EXPERIMENT, find_config, load_config
 
@@ -95,7 +96,15 @@ def evolve(argv: Sequence[str]) -> int:
         default = Path("runs") / f"{stem}-seed-{options.config.seed}"
         directory = RunDirectory(options.output or default)
         directory.refuse_if_used()
-    # simulators are for those who simulate
+    with Progress() as progress:
+        return _run(options, directory, argv, progress)
+
+
+def _run(
+    options: Options, directory: RunDirectory, argv: Sequence[str], progress: Progress
+) -> int:
+    """Begin the run, or go on with it; the exit status."""
+    # a simulator costs seconds to load
     from evolution.run.execution import Run
     from evolution.run.means import Means
 
@@ -113,7 +122,7 @@ def evolve(argv: Sequence[str]) -> int:
                 )
         else:
             run.start()
-        return _carry_out(run, options.live)
+        return _carry_out(run, options.live, progress)
 
 
 def _options(argv: Sequence[str]) -> Options:
@@ -157,21 +166,23 @@ def _kind(config: ExperimentConfig) -> type[Options]:
     return kind
 
 
-def _carry_out(run: "Run", live: bool) -> int:
+def _carry_out(run: "Run", live: bool, progress: Progress) -> int:
     """Evolve, then choose and show the champion; the exit status."""
     evolution, directory = run.evolution, run.directory
     started = time.monotonic()
     with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:
         try:
             with interruption.raising():
-                scores = _finished(run, live)
+                scores = _finished(run, live, progress)
         except Interrupted:
+            progress.close()
             print(
                 f"Interrupted after {directory.evaluations():,} evaluations; "
                 f"continue with: {shell_command(MODULE, '--resume', directory.path)}",
                 file=sys.stderr,
             )
             return interruption.status
+    progress.close()
     minutes, seconds = divmod(round(time.monotonic() - started), 60)
     print(
         f"{evolution.optimizer.name}, seed {evolution.config.seed}: "
@@ -184,20 +195,18 @@ def _carry_out(run: "Run", live: bool) -> int:
     return 0
 
 
-def _finished(run: "Run", live: bool) -> Scores:
+def _finished(run: "Run", live: bool, progress: Progress) -> Scores:
     """Evolve, choose the champion, and give its scores."""
     from evolution.run.live import Live
-    from evolution.run.progress import Progress
 
     evolution = run.evolution
-    budget = evolution.config.evaluations
-    with Progress(budget, evolution.evaluations) as progress:
-        with Live(evolution) if live else nullcontext() as view:
-            for record in run.evolve():
-                progress.update(record)
-                if view is not None:
-                    view.update()
-        return run.finish(progress.stage)
+    progress.begin(evolution.config.evaluations, evolution.evaluations)
+    with Live(evolution) if live else nullcontext() as view:
+        for record in run.evolve():
+            progress.update(record)
+            if view is not None:
+                view.update()
+    return run.finish(progress.stage)
 
 
 def _replay(directory: RunDirectory) -> str:

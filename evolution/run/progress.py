@@ -2,11 +2,12 @@
 
 import sys
 import threading
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from tqdm import tqdm
 
-from evolution.run.generation_loop import Record
+if TYPE_CHECKING:
+    from evolution.run.generation_loop import Record
 
 LINES = 20
 """Lines that the generations of a run print where there is no terminal."""
@@ -21,18 +22,25 @@ class Progress:
     On a terminal the clock of the bar goes on between two updates.
     """
 
-    def __init__(self, budget: int, done: int):
-        """Start at `done` of `budget` evaluations."""
-        self._budget = budget
-        self._next_line = done
+    def __init__(self):
+        """Show that the run is being prepared."""
+        self._budget = self._next_line = 0
         self._terminal = sys.stderr.isatty()
-        self._bar = self._new_bar(total=budget, initial=done, unit="eval")
+        self._bar = self._new_bar(
+            desc="Loading the simulator", bar_format="{desc} [{elapsed}]", leave=False
+        )
         self._ended = threading.Event()
         self._clock = threading.Thread(target=self._tick, daemon=True)
         if self._terminal:
             self._clock.start()
 
-    def update(self, record: Record) -> None:
+    def begin(self, budget: int, done: int) -> None:
+        """Show the generations from now on, at `done` of `budget` evaluations."""
+        self._budget, self._next_line = budget, done
+        self._bar.close()
+        self._bar = self._new_bar(total=budget, initial=done, unit="eval")
+
+    def update(self, record: "Record") -> None:
         """Show one more generation."""
         figures = {
             "gen": str(record.generation),
@@ -78,9 +86,13 @@ class Progress:
         """Itself."""
         return self
 
-    def __exit__(self, *exception: object) -> None:
-        """Leave the terminal tidy."""
+    def close(self) -> None:
+        """Leave the terminal tidy; nothing is shown any more."""
         self._ended.set()
-        if self._terminal:
+        if self._clock.is_alive():
             self._clock.join()
         self._bar.close()
+
+    def __exit__(self, *exception: object) -> None:
+        """See `close`."""
+        self.close()
