@@ -160,7 +160,8 @@ def test_without_a_display_the_recording_is_beside_the_champion(
     assert replay([champion]) == 0
     out, err = capfd.readouterr()
     outcome, line = out.splitlines()
-    assert re.fullmatch(r"run/champion\.json: fitness \d\.\d of 8 \(start test:15, .*", outcome)
+    said = r"run/champion\.json: fitness \d\.\d of 8 \(start test:15, .*"
+    assert re.fullmatch(said, outcome)
     path = here / "run" / "replay.rrd"
     assert re.fullmatch(
         rf"{path}; there is no display here; watch it: \S+ -m rerun {path}", line

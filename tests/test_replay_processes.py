@@ -8,10 +8,12 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from filelock import FileLock
 from matplotlib.image import imread
 from rerun.chunk import RrdReader
 from rerun.experimental import ViewerClient
@@ -87,6 +89,14 @@ def test_without_a_display_a_file_is_written_and_how_to_watch_it(here):
     assert names == {"champion.json", "replay.rrd"}
 
 
+@pytest.fixture
+def viewer_port():
+    """The port of rerun's viewer, for one test at a time on this machine."""
+    with FileLock(Path(tempfile.gettempdir()) / "epuck-mj-viewer.lock", PATIENCE):
+        yield
+
+
+@pytest.mark.usefixtures("viewer_port")
 @pytest.mark.parametrize("display", [":4099", "nonsense"])
 def test_a_display_that_does_not_work_costs_nothing(here, display, monkeypatch, capfd):
     monkeypatch.setenv("DISPLAY", display)
@@ -135,6 +145,7 @@ def test_a_display_that_never_answers_holds_nobody_up(here, monkeypatch):
     verify(here / "replay.rrd")
 
 
+@pytest.mark.usefixtures("viewer_port")
 @pytest.mark.slow
 @needs_proc
 @pytest.mark.skipif(not shutil.which("Xvfb"), reason="no Xvfb (Debian: xvfb)")
