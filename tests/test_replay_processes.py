@@ -125,6 +125,7 @@ def viewers(recording):
     return found
 
 
+@pytest.mark.usefixtures("viewer_port")
 @needs_proc
 def test_a_display_that_never_answers_holds_nobody_up(here, monkeypatch):
     """It accepts a connection and says nothing: the viewer waits, replay does not."""
