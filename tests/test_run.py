@@ -29,7 +29,8 @@ from epuck_mj.scene.model_files import MODELS
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.trials.trajectory import Trajectory
 from evolution.judging.scores import Scores
-from evolution.run import execution, progress, results
+from evolution.run import __main__ as run_command
+from evolution.run import execution, results
 from evolution.run.__main__ import evolve
 from evolution.run.directory import LOCK
 from evolution.run.generation_loop import HISTORY, Record
@@ -819,13 +820,13 @@ class InterruptedAgain(Progress):
     def update(self, record: Record) -> None:
         signal.raise_signal(signal.SIGINT)
 
-    def __exit__(self, *exception: object) -> None:
-        super().__exit__(*exception)
+    def close(self) -> None:
+        super().close()
         signal.raise_signal(signal.SIGINT)
 
 
 def test_a_second_and_a_third_ctrl_c_change_nothing(here, handlers, monkeypatch, capfd):
-    monkeypatch.setattr(progress, "Progress", InterruptedAgain)
+    monkeypatch.setattr(run_command, "Progress", InterruptedAgain)
     try:
         assert evolve(["ga", *TINY, "--output", "run"]) == 130
         # and on the way to the end of the process

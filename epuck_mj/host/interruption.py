@@ -95,17 +95,27 @@ def _follows_interruption(error: BaseException) -> bool:
 
 
 @contextmanager
+def ignoring_interrupts() -> Iterator[None]:
+    """Let processes that any thread starts in the block ignore Ctrl-C.
+
+    A Ctrl-C during the block is lost.
+    """
+    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+@contextmanager
 def deaf_to_interrupts() -> Iterator[None]:
-    """Let processes started in the block ignore Ctrl-C, as their parent ends them.
+    """Let processes that this thread starts in the block ignore Ctrl-C.
 
     A Ctrl-C during the block reaches this process when the block ends.
     """
     if not hasattr(signal, "pthread_sigmask"):
-        previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
-        try:
+        with ignoring_interrupts():
             yield
-        finally:
-            signal.signal(signal.SIGINT, previous)
         return
     # as it starts, it lets signals in again
     resource_tracker.ensure_running()

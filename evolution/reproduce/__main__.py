@@ -54,20 +54,20 @@ def reproduce_paper(argv: Sequence[str]) -> int:
     options = parse(
         ReproduceOptions, "python -m evolution.reproduce", argv, examples=EXAMPLES
     )
+    if options.wheels is not None and options.study is None:
+        raise UserError("expected --study with --wheels")
     if [options.quick, options.full, options.study is not None].count(True) != 1:
         raise UserError(
             "expected one of --quick (3 seeds, ten minutes on two cores), --full (30 "
             "seeds, days on two cores) and --study (write the verdict on a study that "
             "is there)"
         )
-    if options.wheels is not None:
-        if options.study is None:
-            raise UserError("expected --study with --wheels")
-        if options.wheels.name == options.study.name:
-            raise UserError(
-                f"expected studies in folders of different names, got "
-                f"'{options.study}' and '{options.wheels}'"
-            )
+    study_names = [each.name for each in (options.study, options.wheels) if each]
+    if len(set(study_names)) < len(study_names):
+        raise UserError(
+            f"expected studies in folders of different names, got '{options.study}' "
+            f"and '{options.wheels}'"
+        )
     if options.study is not None:
         places, failed = [options.study, options.wheels], 0
     else:

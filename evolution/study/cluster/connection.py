@@ -22,7 +22,7 @@ from distributed import (
 from distributed.comm.core import connect
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.interruption import deaf_to_interrupts
+from epuck_mj.host.interruption import ignoring_interrupts
 
 REMOTE = re.compile(r"(tcp|tls)://[^\s/]+:\d{1,5}")
 LOCAL = re.compile(r"local:([1-9]\d{0,2})")
@@ -199,7 +199,7 @@ def connected(address: str) -> Iterator[Cluster]:
             _greet(address)
             scheduler = address
         else:
-            with deaf_to_interrupts(), dask.config.set(QUIET):
+            with ignoring_interrupts(), dask.config.set(QUIET):
                 scheduler = LocalCluster(n_workers=int(local[1]), **LOCAL_SETTINGS)
             stack.callback(scheduler.close)
         client = Client(scheduler, timeout=SCHEDULER_PATIENCE, set_as_default=False)
