@@ -318,8 +318,8 @@ def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
     tests = stored["held_out"]
     mean, crashes = tests["epuck"]["mean"], tests["epuck"]["crash_rate"]
     assert headline == (
-        f"The champion earns {mean:.1f} of 20: the mean of 30 fresh starts on epuck, "
-        f"{crashes:.0%} of them end in a crash"
+        f"The champion earns {mean:.1f} of 20: the mean of 30 fresh starts on epuck; "
+        f"{crashes:.0%} of the trials end in a crash"
     )
     mean, crashes = (tests["epuck_planar"][key] for key in ("mean", "crash_rate"))
     assert plane == f"On epuck_planar {mean:.1f} ({crashes:.0%} crash)"

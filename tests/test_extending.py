@@ -173,6 +173,19 @@ def test_own_parts_change_nothing_of_what_changes_nothing(here):
     assert ExperimentConfig.from_yaml(config.to_yaml(), "text") == config
 
 
+def test_racing_changes_nothing_where_each_step_costs(here):
+    """There an individual that crashes early has the highest fitness."""
+    (here / "cost.py").write_text(
+        "def cost(step):\n    return -1.0 - 0.0 * step.contact\ncost.maximum = -1.0\n"
+    )
+    flags = f"--fitness cost.py:cost --steps 60 --trials 2 --population 10 {FEW}"
+    for racing in ("racing", "no-racing"):
+        argv = f"de-best {flags} --evaluations 80 --output {racing}".split()
+        assert evolve(argv + ["--no-racing"] * (racing == "no-racing")) == 0
+    one, other = (here / name / "history.csv" for name in ("racing", "no-racing"))
+    assert one.read_bytes() == other.read_bytes()
+
+
 def test_an_edited_part_is_refused_on_resume(here):
     assert evolve(f"{ALL_OWN} --output run".split()) == 0
     provenance = here / "run" / "provenance.json"

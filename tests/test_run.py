@@ -422,7 +422,7 @@ def test_a_run_on_an_own_robot_of_another_name(here, no_pictures, capsys):
     # an empty directory is as good as none
     assert evolve(["ga", *SHORT, "--robot", "mine.xml", "--output", "out"]) == 0
     out = capsys.readouterr().out
-    assert "5 fresh starts on epuck, " in out
+    assert "5 fresh starts on epuck; " in out
     assert "On mine.xml " in out
     origin = load_controller("out/champion.json").origin
     assert origin.robot == str(here / "mine.xml")

@@ -8,7 +8,6 @@ remembered.
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
-from multiprocessing import resource_tracker
 from typing import Any, Self
 
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
@@ -117,6 +116,9 @@ def deaf_to_interrupts() -> Iterator[None]:
         with ignoring_interrupts():
             yield
         return
+    # for those who start processes
+    from multiprocessing import resource_tracker
+
     # as it starts, it lets signals in again
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])

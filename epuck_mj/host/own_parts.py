@@ -6,7 +6,6 @@ runs that file, as importing it does.
 
 import hashlib
 import importlib
-import importlib.util
 import sys
 import traceback
 from dataclasses import dataclass

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.files import is_file
+from epuck_mj.host.files import is_directory, is_file
 from epuck_mj.host.yaml_and_json import read_json
 from epuck_mj.policies.topology import Topology, topology_from
 from epuck_mj.step.control import BatchPolicy, TaskParameters
@@ -131,7 +131,7 @@ def load_controller(path: str | Path) -> ControllerFile:
         UserError: if there is none, or it is not a controller file.
     """
     path = Path(path)
-    if path.is_dir():
+    if is_directory(path):
         path /= CHAMPION
         if not is_file(path):
             raise UserError(f"no champion in '{path.parent}': its run is not finished")

@@ -14,6 +14,26 @@ from epuck_mj.constants import N_PROXIMITY
 N_ACTIONS = 2
 
 
+def genomes_of(genomes: np.ndarray, n_genes: int, network: str) -> np.ndarray:
+    """Genomes `(..., n_genes)` as floats.
+
+    Args:
+        genomes: `(..., genes)`.
+        n_genes: number of genes that the network has.
+        network: its name in the message.
+
+    Raises:
+        ValueError: if the genomes have another length.
+    """
+    genomes = np.asarray(genomes, float)
+    if genomes.shape[-1] != n_genes:
+        raise ValueError(
+            f"expected genomes of {n_genes} genes for {network}, "
+            f"got {genomes.shape[-1]}"
+        )
+    return genomes
+
+
 @dataclass(frozen=True)
 class Network:
     """Shape of the network.
@@ -56,12 +76,7 @@ class Network:
         Raises:
             ValueError: if the genomes have another length.
         """
-        genomes = np.asarray(genomes, float)
-        if genomes.shape[-1] != self.n_genes:
-            raise ValueError(
-                f"expected genomes of {self.n_genes} genes for {self}, "
-                f"got {genomes.shape[-1]}"
-            )
+        genomes = genomes_of(genomes, self.n_genes, str(self))
         n_in = N_PROXIMITY + self.biases
         batch = genomes.shape[:-1]
         hidden, output = np.split(genomes, [n_in * self.hidden], axis=-1)

@@ -22,7 +22,7 @@ import numpy as np
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
 from epuck_mj.host.own_parts import failure, own_part
-from epuck_mj.policies.network import N_ACTIONS, Network
+from epuck_mj.policies.network import N_ACTIONS, Network, genomes_of
 from epuck_mj.step.control import BatchPolicy
 
 GENES_MAX = 1_000_000
@@ -89,12 +89,7 @@ class OwnNetwork:
         Raises:
             ValueError: if the genomes have another length.
         """
-        genomes = np.asarray(genomes, float)
-        if genomes.shape[-1] != self.n_genes:
-            raise ValueError(
-                f"expected genomes of {self.n_genes} genes for '{self.name}', "
-                f"got {genomes.shape[-1]}"
-            )
+        genomes = genomes_of(genomes, self.n_genes, f"'{self.name}'")
         state = np.zeros((*genomes.shape[:-1], self.network.n_state))
         return OwnController(self, genomes, state)
 

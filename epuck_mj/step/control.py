@@ -95,8 +95,15 @@ class TaskParameters:
     @property
     def most(self) -> float | None:
         """The most that a trial can earn; None if that is not known."""
+        return self.most_in(self.steps)
+
+    def most_in(self, steps: int) -> float | None:
+        """The most that so many control steps can earn; None if that is not known.
+
+        It is 0 at least: a crash may end the trial before any of them.
+        """
         maximum = self.step_fitness.maximum
-        return None if maximum is None else self.steps * maximum
+        return None if maximum is None else steps * max(maximum, 0.0)
 
     @property
     def step_fitness(self) -> StepFitness:
@@ -278,7 +285,6 @@ def run_trials(
     steps = np.zeros(n_trials, int)
     crashed = np.zeros(n_trials, bool)
     active = np.arange(n_trials)
-    maximum = task.step_fitness.maximum
     policy = started(policy, n_trials)
     reading = robots.reset(starts)
     observation = observe(reading.distance, task.sensor_range)
@@ -293,9 +299,10 @@ def run_trials(
         steps[active] += 1
         alive = ~step.reading.contact
         crashed[active] = ~alive
-        if lost is not None and maximum is not None:
+        left = None if lost is None else task.most_in(task.steps - 1 - k)
+        if lost is not None and left is not None:
             most = fitness.copy()
-            most[active[alive]] += (task.steps - 1 - k) * maximum
+            most[active[alive]] += left
             alive &= ~lost(most)[active]
         # those who are done leave; everything kept per robot follows
         if not alive.all():

@@ -127,7 +127,8 @@ class Scores(_Record, frozen=True):
         of = "" if most is None else f" of {most:g}"
         lines = [
             f"The champion earns {test.mean:.1f}{of}: the mean of {test.starts:,} "
-            f"fresh starts on {first}, {test.crash_rate:.0%} of them end in a crash"
+            f"fresh starts on {first}; {test.crash_rate:.0%} of the trials end in a "
+            "crash"
         ]
         if others:
             lines.append(f"On {_in_words({o: self.held_out[o] for o in others})}")

@@ -173,12 +173,12 @@ class RunDirectory:
                 f"cannot resume '{self.path}': its robot or arena has been edited "
                 f"since (SHA-256 {before}, now {after})"
             )
-        parts, others = first.get("own_sha256", {}), now["own_sha256"]
-        for name in others:
-            if parts.get(name) != others[name]:
+        own = first.get("own_sha256", {})
+        for name, after in now["own_sha256"].items():
+            if own.get(name) != after:
                 raise UserError(
                     f"cannot resume '{self.path}': '{name}' has been edited since "
-                    f"(SHA-256 {parts.get(name)}, now {others[name]})"
+                    f"(SHA-256 {own.get(name)}, now {after})"
                 )
 
     def save(self, evolution: "Evolution", seconds: Sequence[float]) -> None:
