@@ -160,7 +160,7 @@ MOTOR_TICK_RATE = 10_000
 """Ticks by which the motors' step periods are counted [1/s]. FIRMWARE."""
 
 MOTOR_TICK_RATE_2 = 50_000
-"""Ticks of the e-puck2's motor timer: half-steps at 100 kHz [1/s]. FIRMWARE2."""
+"""Ticks of the e-puck2's step periods: half-steps timed at 100 kHz [1/s]. FIRMWARE2."""
 
 COIL_TICKS = 15
 """Ticks for which a slow motor's coil is on at each step: 1.5 ms. FIRMWARE."""

@@ -34,7 +34,8 @@ class Options:
     """Let a controller drive a real e-puck, and stop the robot at the end.
 
     Attributes:
-        champion: controller file, or wall-follower, the hand-written controller.
+        champion: directory of a finished run, controller file, or wall-follower, the
+            hand-written controller.
         port: port of the robot: /dev/rfcomm0, COM5 or socket://host:port; for an
             e-puck2 over WiFi tcp://host:1000.
         seconds: duration of the drive [s].

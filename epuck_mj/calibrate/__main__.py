@@ -88,7 +88,7 @@ def calibrate_robot(
         person = Person(ask, interruption)
         print("The robot drives. Ctrl-C stops it and ends.", flush=True)
         try:
-            # before anybody lays out a floor
+            # see that the robot answers before a person lays out a floor
             bench.with_robot(known, lambda robot: None)
             for step in steps:
                 known = STEPS[step](bench, person, known)

@@ -50,7 +50,7 @@ N_REST = 5
 """Number of readings after which a stopped robot's counters are at rest."""
 
 SPARE_TIME = 5.0
-"""Extra time after which a drive of twice its time has failed [s]. Chosen."""
+"""Time beyond twice its own after which a drive has failed [s]. Chosen."""
 
 
 @dataclass(frozen=True)

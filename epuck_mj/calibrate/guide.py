@@ -32,7 +32,7 @@ from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.motors import STEP_ANGLE
 
 CLEARANCES = (0.010, 0.020, 0.030)
-"""Clearances from shell to wall of the sensor readings [m]."""
+"""Clearances from shell to wall [m] at which sensors are good but do not saturate."""
 
 RESIDUAL_MAX = 0.25
 """Residual above which a sensor gets a warning. Chosen."""
@@ -208,4 +208,4 @@ STEPS = {
     "turn": measure_track,
     "sensors": measure_gains,
 }
-"""Steps of a calibration, in order."""
+"""Steps of a calibration, in the order in which each helps the next."""

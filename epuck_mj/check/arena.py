@@ -24,7 +24,7 @@ from epuck_mj.scene.starts import FreeSpace, Grid, survey
 from epuck_mj.step.control import START_CLEARANCE
 
 SUBSTEPS_MAX = 10_000
-"""Most physics steps in a control step."""
+"""Most physics steps in a control step: more would take too long."""
 
 N_STARTS = 8
 """Number of starts at which a robot is left at rest."""
@@ -93,7 +93,7 @@ def _check(arena: Path, robot: str) -> Report:
 
 
 def _scene(source: Source, robot: str) -> Scene:
-    """The scene, if it can be compiled.
+    """The scene, if a usable one can be made of the source.
 
     Raises:
         Unusable: if not.

@@ -52,7 +52,7 @@ def room_findings(scene: Scene, grid: Grid) -> list[Finding]:
 
 
 def _why_none(scene: Scene, grid: Grid) -> str:
-    """Finding why no free node is enclosed: a gap in the walls, or no room."""
+    """Text on why no free node is enclosed: a gap in the walls, or no room."""
     try:
         poses = np.zeros((*grid.free.shape, 3))
         poses[..., :2] = grid.nodes

@@ -169,7 +169,11 @@ def _shown(tag: str, attributes: Mapping[str, str]) -> str:
 
 
 def _included(element: Element, arena: Path) -> str:
-    """Name of the file that an include names, if the attribute is there."""
+    """Name of the file that an include names.
+
+    Raises:
+        Unusable: if there is no such file.
+    """
     name = element.attributes.get("file", "")
     path = arena.parent / name
     if path.name not in SHIPPED_ROBOTS and not is_file(path):

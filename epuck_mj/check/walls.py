@@ -41,7 +41,7 @@ class Heights:
 
 
 def finite_findings(model: mujoco.MjModel, places: tuple[Place, ...]) -> list[Finding]:
-    """Errors for geoms at infinite or very distant places."""
+    """Errors for geoms so far away that nothing can be measured with them."""
     data = at_rest(model)
     values = np.concatenate([data.geom_xpos, data.geom_xmat, model.geom_size], axis=1)
     nowhere = ~(np.abs(values) < FAR).all(axis=1)
@@ -52,7 +52,7 @@ def finite_findings(model: mujoco.MjModel, places: tuple[Place, ...]) -> list[Fi
 
 
 def plane_findings(model: mujoco.MjModel, places: tuple[Place, ...]) -> list[Finding]:
-    """Errors for planes that the shell would hit."""
+    """Errors for planes that the shell would hit: no scene can be made with them."""
     planes = (model.geom_type == _SHAPE.mjGEOM_PLANE) & walls(model)
     data = at_rest(model)
     return [
@@ -160,7 +160,7 @@ def _wall(
 
 
 def _below(high: float, place: Place, heights: Heights) -> list[Finding]:
-    """Finding about a geom below the shell that could hit it: probably a floor."""
+    """Finding about a geom with a wall's bits below the shell: probably a floor."""
     if high > heights.shell[0] - START_CLEARANCE:
         text = "it lies below the shell, which may start nowhere near it; "
         text += f"expected {FLOOR_BITS} for a floor"
@@ -187,7 +187,7 @@ def _no_wall(
 
 
 def _moving(model: mujoco.MjModel, geom: int, place: Place) -> list[Finding]:
-    """Finding about a geom that moves and that the robot could touch."""
+    """Finding about a moving geom that the shell can hit or rays can see."""
     hit = can_touch(model, model.geom(SHELL).id)[geom]
     if not hit and not seen_by_rays(model)[geom]:
         return []
@@ -197,7 +197,7 @@ def _moving(model: mujoco.MjModel, geom: int, place: Place) -> list[Finding]:
 
 
 def _mesh(model: mujoco.MjModel, geom: int, place: Place) -> list[Finding]:
-    """Finding about a mesh with hollows, which the shell hits as its convex hull."""
+    """Finding about a mesh with hollows: rays see them, the shell hits its hull."""
     if model.geom_type[geom] != _SHAPE.mjGEOM_MESH:
         return []
     vertices, faces = mesh(model, geom)

@@ -112,13 +112,13 @@ EXTRAS = (
     (r"^(\w+) Input should be greater than ", r"\1: expected more than "),
     (r"^(\w+) Input should be ", r"\1: expected "),
 )
-"""Texts that pydantic adds for programmers, and their replacements."""
+"""Texts that tyro and pydantic add for programmers, and their replacements."""
 
 
 def main(run: Callable[[Sequence[str]], int]) -> None:
     """Run a command line and leave the process with its exit status.
 
-    Each may raise `UserError`, for anything the user can put right.
+    `run` may raise `UserError` for anything that the user can put right.
     """
     try:
         status = run(sys.argv[1:])
@@ -148,7 +148,7 @@ def check_threads(threads: int) -> None:
     """Refuse negative or too large numbers of threads; 0 stands for one per core.
 
     Raises:
-        UserError: if not.
+        UserError: for such a number.
     """
     if not 0 <= threads <= THREADS_MAX:
         raise UserError(f"expected threads from 0 to {THREADS_MAX}, got {threads}")

@@ -119,7 +119,7 @@ def check_writable(path: Path) -> None:
     """Refuse a path where no file can be written, before the work is done.
 
     Raises:
-        UserError: if not.
+        UserError: for such a path.
     """
     if is_directory(path):
         raise UserError(f"cannot write '{path}': it is a folder")

@@ -119,7 +119,7 @@ def deaf_to_interrupts() -> Iterator[None]:
     # for those who start processes
     from multiprocessing import resource_tracker
 
-    # as it starts, it lets signals in again
+    # the tracker lets signals in again as it starts, so it starts before the block
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:

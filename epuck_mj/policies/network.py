@@ -50,7 +50,7 @@ class Network:
         """Refuse an invalid number of hidden neurons or invalid biases.
 
         Raises:
-            ValueError: if it is none.
+            ValueError: if either is invalid.
         """
         if type(self.hidden) is not int or self.hidden < 1:
             raise ValueError(f"expected hidden neurons, 1 or more, got {self.hidden!r}")

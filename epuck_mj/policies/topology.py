@@ -9,7 +9,7 @@ A user's network is a class without arguments, `my.py:Name`, with
 where genomes are `(..., n_genes)`, observations `(..., 8)`, states `(..., n_state)`, 0
 at a start, and actions `(..., 2)`: v in [0, 1], w in [-1, 1]. A robot has to act the
 same alone and among others, so sums are to be written out: a matrix product adds in an
-order that hangs on how many robots there are.
+order that depends on how many robots there are.
 """
 
 from collections.abc import Mapping
@@ -168,13 +168,13 @@ def topology_from(fields: Mapping[str, Any]) -> Topology:
 
 
 def check_network(name: str) -> None:
-    """Nothing, if a user's network acts the same alone and among others.
+    """Refuse a user's network that acts otherwise alone than among others.
 
     Args:
         name: as `my.py:Name`.
 
     Raises:
-        UserError: if it does not, or gives no actions.
+        UserError: for such a network, or one that gives no actions.
     """
     own, rng = OwnNetwork(name), np.random.default_rng(0)
     genomes = rng.uniform(-5, 5, (37, own.n_genes))

@@ -6,7 +6,7 @@ It keeps walls on its right. Its few numbers were chosen by hand in the paper's 
 import numpy as np
 
 YARDSTICK = "wall-follower"
-"""Name of the hand-written wall follower, where a champion may be named."""
+"""Name of the hand-written wall follower, among champions and among experiments."""
 
 BEHIND, RIGHT, RIGHT_DIAGONAL = 3, 2, 1
 AHEAD = (0, 6, 7)
@@ -16,7 +16,7 @@ CLEAR_AHEAD = 0.95
 """Observation below which there is a wall ahead."""
 
 TARGET = 0.5
-"""Observation of the right diagonal sensor to keep: about 7 mm from the wall."""
+"""Right-diagonal observation to keep: about 7 mm from the wall, driving along it."""
 
 GAIN = 1.5
 TURN_MAX = 0.4

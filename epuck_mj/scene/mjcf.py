@@ -138,7 +138,7 @@ def _includes(text: str, path: Path) -> list[str]:
 
 
 def _included(path: Path) -> str:
-    """Text of an included file, which must not include others."""
+    """Text of an included file, which may include none: those would not be hashed."""
     text = read_text(path)
     inner = _includes(text, path)
     if inner:

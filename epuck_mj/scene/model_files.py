@@ -18,7 +18,7 @@ evolved on it on the second as well."""
 
 
 def absolute(name: str) -> str:
-    """The name of a robot or arena, or its absolute path."""
+    """The name of a robot or arena; if it is a path to a file, the absolute path."""
     path = Path(name)
     shipped = {file.stem for file in MODELS.rglob("*.xml")}
     return name if name in shipped or not is_file(path) else str(path.resolve())

@@ -22,7 +22,7 @@ def check_base(model: mujoco.MjModel, robot: Path) -> None:
     """Refuse a robot whose pose cannot be set.
 
     Raises:
-        UserError: if it is one.
+        UserError: for such a robot.
     """
     body = index_of(model, mujoco.mjtObj.mjOBJ_BODY, ROBOT_BODY, robot)
     first, count = model.body_jntadr[body], model.body_jntnum[body]

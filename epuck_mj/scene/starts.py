@@ -69,7 +69,7 @@ class Grid:
 
 @once_per_model
 def survey(scene: Scene, clearance: float) -> Grid:
-    """Grid of the places where a robot fits.
+    """Grid of the places where a robot fits, whether or not it may start there.
 
     Args:
         scene: robot and arena.
@@ -154,7 +154,7 @@ class FreeSpace:
 
 
 def _with_margin(model: mujoco.MjModel, clearance: float) -> mujoco.MjModel:
-    """The model with a shell that is larger by a clearance [m]."""
+    """The model with a shell that touches things already at a clearance [m]."""
     model = copy.copy(model)
     model.geom_margin[model.geom(SHELL).id] = clearance
     model.body_margin[model.body(ROBOT_BODY).id] = clearance

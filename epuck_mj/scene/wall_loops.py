@@ -23,7 +23,7 @@ POINT_SPACING = 0.002
 """Distance of loop points [m]: far less than the 13 mm of a control step."""
 
 BIN = 0.05
-"""Length of the parts of a loop that count as visited [m]: more than a cut corner."""
+"""Length of a loop's parts, each visited or not [m]: more than a cut corner skips."""
 
 ABSENCE_MAX = 0.15
 """Longest way away from walls that still counts as following [m]: a cut corner.

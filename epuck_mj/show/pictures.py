@@ -1,4 +1,4 @@
-"""Pictures as files, written completely or not at all, with equal bytes if equal."""
+"""Pictures as files, complete or not written at all; equal pictures, equal bytes."""
 
 import io
 from pathlib import Path

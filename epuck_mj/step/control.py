@@ -21,7 +21,7 @@ START_CLEARANCE = 0.01
 Policy = Callable[[np.ndarray], np.ndarray]
 
 Lost = Callable[[np.ndarray], np.ndarray]
-"""Function from the most that trials can still reach to those to end, `(trials,)`."""
+"""Which trials to end, `(trials,)`, given the most that each can still reach."""
 
 
 class Robot(Protocol):

@@ -156,7 +156,7 @@ def draw_disturbances(
     noise: Noise,
     ranges: Ranges = BOOK,
 ) -> Disturbances:
-    """Draw disturbances of `n` trials, each with its own robot.
+    """Draw disturbances of `n` trials, independently for each.
 
     Args:
         rng: where they come from.

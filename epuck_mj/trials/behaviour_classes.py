@@ -32,7 +32,7 @@ HUG = 0.005
 """Clearance below which a follower hugs [m]: less than a real robot's errors."""
 
 BOUNCES = 3
-"""Least visits to walls of a bouncer: followers may have two."""
+"""Least visits to walls of a bouncer: an odd start and a search make only two."""
 
 OTHER = "other"
 

@@ -19,7 +19,10 @@ SUCCESS_LAPS = 1.0
 """Least laps of a success. Source: our reading of the paper, behaviour metrics."""
 
 FOLLOWING_SHARE = 0.7
-"""Least share of time near walls since the first wall, of a success."""
+"""Least share of time near walls since the first wall, of followers and successes.
+
+Source: as of SUCCESS_LAPS.
+"""
 
 FOLLOWING_SPEED = 0.25
 """Least mean net progress along walls since the first one, as a share of top speed.

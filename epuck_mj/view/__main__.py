@@ -52,7 +52,7 @@ class Options:
     seed: int = 0
     """seed of random starts and noise"""
     robots: ConditionFlags = field(default_factory=ConditionFlags)
-    """noise and differences of the robot; by default those in config.yaml beside it"""
+    """noise and differences of the robot; by default those of the champion's run"""
 
 
 def view(argv: Sequence[str]) -> int:

@@ -51,7 +51,7 @@ def watch(
     task: TaskParameters,
     meet: Callable[[], Disturbances | None] = lambda: None,
 ) -> Iterator[str]:
-    """Show trials in a window until it is closed or no start is left; print each.
+    """Show trials in a window until it closes or no start is left; yield a line each.
 
     Args:
         window: MuJoCo's handle of its viewer: `sync`, `is_running`.

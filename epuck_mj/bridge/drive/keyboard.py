@@ -48,7 +48,7 @@ class Keyboard:
 
 @contextmanager
 def keyboard() -> Iterator[Keyboard]:
-    """Keys of standard input during the block, without Enter."""
+    """Keys of standard input during the block; then Enter is needed again."""
     if not (termios and tty) or sys.stdin is None or not sys.stdin.isatty():
         yield Keyboard(None)
         return

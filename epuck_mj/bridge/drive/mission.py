@@ -99,7 +99,7 @@ def accomplish(
             status = interruption.status
             still = "the robot stands still" if robot and robot.met else "never began"
             word = f"{interruption.signum.name}: ended, {still}"
-        # stdout may be closed
+        # stdout may be closed, so errors go to stderr first
         if status:
             print(word, file=sys.stderr, flush=True)
         print(facts, flush=True)

@@ -48,7 +48,7 @@ class Options:
         seed: seed of random scenarios, garbage and lost bytes.
         latency: delay of each direction [s], in addition to the UART's.
         speed: how many times faster than real time the emulation runs.
-        journal: file (.npz) to record everything that the robot did to.
+        journal: file (.npz) for a record of everything that the robot did.
     """
 
     arena: Annotated[str, word("ARENA")] = "arena"

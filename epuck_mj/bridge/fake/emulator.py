@@ -111,7 +111,7 @@ class Emulator:
         return [f for f in self._faults if f.kind in kinds and f.lasts(time)]
 
     def _befall(self, now: float) -> None:
-        """Carry out a fault that happens once."""
+        """Carry out the due faults of the kinds that happen once."""
         if self._begun is None:
             return
         for fault in self._faults:

@@ -126,7 +126,7 @@ class Motors:
         self.count_from(0, 0)
 
     def drive(self, left: int, right: int) -> None:
-        """Turn at the speeds nearest to these [steps/s] that the motors can make."""
+        """Turn at these speeds [steps/s], as exactly as the motors can."""
         before, self.commanded = self.commanded, (left, right)
         self._body.drive(*map(self._timer.wheel, self.commanded, before))
 

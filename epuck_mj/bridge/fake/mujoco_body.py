@@ -22,7 +22,7 @@ from epuck_mj.step.motors import STEP_ANGLE
 from epuck_mj.step.sensors import Reading, proximity
 
 LEAD = 0.0045
-"""Longest time from a command to the end of its physics step [s]. Chosen.
+"""Delay with which later commands still meet their physics step [s]. Chosen.
 
 Readings, asked for some 4 ms before commands, then see samples of 16 ms all in the same
 physics step if that is one of 25 ms.

@@ -1,4 +1,4 @@
-"""Base of the emulated firmwares, which receive bytes and send replies in time."""
+"""Base of the emulated firmwares, which receive and send bytes as time passes."""
 
 from abc import ABC, abstractmethod
 

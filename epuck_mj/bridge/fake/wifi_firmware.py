@@ -31,7 +31,7 @@ from epuck_mj.constants import (
 )
 
 TIMER = MotorTimer(STEP_RATE_MAX, MOTOR_TICK_RATE_2, saves_current=False)
-"""Timing of motors behind a radio that accepts lower speeds only."""
+"""Motor timing with the radio's speed limit, below that of the main processor."""
 
 
 class WifiFirmware(Talker):

@@ -68,7 +68,7 @@ class Steps:
 
 @dataclass(frozen=True)
 class Cycle:
-    """Counts and step counters of a control step.
+    """Proximity counts and step counters of a control step.
 
     Attributes:
         proximity: the proximity counts.

@@ -29,7 +29,7 @@ DISMISSAL_TIME_MAX = 2.0
 def hire(fileno: Callable[[], int], farewell: bytes) -> subprocess.Popen | None:
     """Start a guardian; None without a stop message or a descriptor to share.
 
-    Windows has none, nor have ports that are no files.
+    There is no guardian on Windows, nor for ports that are no files.
 
     Args:
         fileno: gives the file descriptor of the robot's port.
@@ -62,7 +62,7 @@ def dismiss(process: subprocess.Popen | None) -> None:
 
 
 def guard(pipe: int, port: int, farewell: bytes) -> bool:
-    """Wait for the bridge's end and stop the robot; whether that was needed.
+    """Wait for the bridge's end and, if it was killed, stop the robot; whether it was.
 
     Args:
         pipe: file descriptor that ends with the bridge.

@@ -14,7 +14,7 @@ class Port(Protocol):
         ...
 
     def receive(self, timeout: float) -> bytes:
-        """The bytes that came within `timeout` seconds; LinkLost if it is gone."""
+        """Bytes that came, after `timeout` seconds at most; LinkLost if it is gone."""
         ...
 
     def close(self) -> None:
@@ -64,10 +64,10 @@ class Connection(Protocol):
         ...
 
     def stop(self) -> None:
-        """Stop the robot until it confirms; a lost port is opened again.
+        """Tell the robot to stop until it confirms; a lost port is opened again.
 
         Raises:
-            StillMoving: if it did not say so in bounded time.
+            StillMoving: if it did not confirm in bounded time.
         """
         ...
 

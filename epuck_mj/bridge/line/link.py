@@ -181,7 +181,7 @@ class Link:
         return came
 
     def flush(self) -> None:
-        """End any command that the robot waits to complete; ASCII follows.
+        """End any command that the robot waits to complete; ASCII has to follow.
 
         Raises:
             LinkLost: if the port is gone.

@@ -10,7 +10,7 @@ class LosablePort:
     """A port that is closed as soon as it is lost; see `interfaces.Port`."""
 
     def __init__(self, open_port: Callable[[], Port]) -> None:
-        """Open the port by `open_port`, which is called again after each loss.
+        """Open the port by `open_port`, which `reopen` calls again.
 
         Raises:
             UserError: if that is not possible.

@@ -50,7 +50,7 @@ class SerialLine:
         """See Connection; synchronises again if host and robot are out of step.
 
         Raises:
-            BridgeError: if they did not; names what was wrong first.
+            BridgeError: if that fails; names what was wrong first.
             RobotRestarted: if the robot was reset.
             LinkLost: if the port is gone.
         """

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from epuck_mj.show.recording import Trial
 
 PLOTTED_CLEARANCE = 60.0
-"""Highest clearance that a plot shows at first [mm]."""
+"""Highest clearance that a plot shows at first [mm]: the range of wall following."""
 
 PLOTTED_COUNTS = 4096
 """End of the proximity plot: the sensors' converters have 12 bits."""

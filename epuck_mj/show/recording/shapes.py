@@ -35,7 +35,7 @@ def log_arena(stream: rr.RecordingStream, model: mujoco.MjModel) -> None:
 def log_robot(
     stream: rr.RecordingStream, model: mujoco.MjModel, place: Entities
 ) -> None:
-    """Log the geoms that move, in their bodies' frames, with a mark if asked."""
+    """Log the moving geoms in their bodies' frames, and a mark among several trials."""
     for geom in _drawn(model, moving=True):
         body = place.body(body_name(model, model.geom_bodyid[geom]))
         _log(stream, model, geom, body, model.geom_pos[geom], model.geom_quat[geom])
