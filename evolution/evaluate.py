@@ -88,7 +88,7 @@ def evaluate_policies(argv: Sequence[str]) -> int:
                 candidate.policy, options.starts, met(steps)
             )
             print(f"{candidate.name}, {Path(robot).name} in {Path(arena).name}")
-            print(_described(test, steps), flush=True)
+            print(_described(test, candidate.task.most), flush=True)
             where = {"name": candidate.name, "robot": robot, "arena": arena}
             tests.append(where | asdict(conditions) | test.to_dict())
     if options.json is not None:
@@ -97,14 +97,15 @@ def evaluate_policies(argv: Sequence[str]) -> int:
     return 0
 
 
-def _described(test: HeldOut, steps: int) -> str:
+def _described(test: HeldOut, most: float | None) -> str:
     """Indented lines with the scores of a policy."""
+    of = "" if most is None else f" of {most:g}"
     low, high = test.interval
     metrics = test.metrics
     shares = sorted(test.behaviour.items(), key=lambda item: -item[1])
     did = ", ".join(f"{name} {share:.1%}" for name, share in shares if share > 0)
     return (
-        f"  fitness of {steps}: mean {test.mean:.1f} (95 % CI {low:.1f} to "
+        f"  fitness{of}: mean {test.mean:.1f} (95 % CI {low:.1f} to "
         f"{high:.1f}), sd {test.standard_deviation:.1f}, worst 5 % {test.worst:.1f}, "
         f"{test.starts} starts\n"
         f"  crashes: {test.crash_rate:.1%} of the trials, "

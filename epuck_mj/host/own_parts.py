@@ -94,6 +94,8 @@ def _installed(name: str) -> tuple[ModuleType, bytes]:
         source = Path(str(module.__file__)).read_bytes()
     except (ImportError, OSError) as error:
         raise UserError(f"cannot import '{name}': {error}") from None
+    except Exception as error:
+        raise UserError(f"'{name}' {failure(error)}") from None
     return module, source
 
 
@@ -107,7 +109,7 @@ def failure(error: Exception, path: str | None = None) -> str:
     frames = traceback.extract_tb(error.__traceback__)
     lines = [frame.lineno for frame in frames if path in (None, frame.filename)]
     if isinstance(error, SyntaxError):
-        lines = [error.lineno]
+        lines = [error.lineno] if error.lineno else []
     where = f"in line {lines[-1]} " if lines else ""
     what = " ".join(str(error).split())
     return f"failed {where}with {type(error).__name__}: {what}"

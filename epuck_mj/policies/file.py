@@ -124,17 +124,26 @@ class ControllerFile:
         return cls(network, genome, task, origin, fields["scores"])
 
 
+def champion_file(path: Path) -> Path:
+    """The controller file at a path: of the directory of a run, its champion's.
+
+    Raises:
+        UserError: if the run has no champion yet.
+    """
+    if not is_directory(path):
+        return path
+    if not is_file(path / CHAMPION):
+        raise UserError(f"no champion in '{path}': its run is not finished")
+    return path / CHAMPION
+
+
 def load_controller(path: str | Path) -> ControllerFile:
     """The controller stored at `path`, a file or the directory of a finished run.
 
     Raises:
         UserError: if there is none, or it is not a controller file.
     """
-    path = Path(path)
-    if is_directory(path):
-        path /= CHAMPION
-        if not is_file(path):
-            raise UserError(f"no champion in '{path.parent}': its run is not finished")
+    path = champion_file(Path(path))
     fields = read_json(path)
     try:
         return ControllerFile.from_dict(fields)

@@ -71,7 +71,7 @@ class OwnNetwork:
             raise UserError(f"network '{self.name}': expected a method 'act'")
         for key, least in (("n_genes", 1), ("n_state", 0)):
             n = getattr(network, key, None)
-            if not isinstance(n, int) or not least <= n <= GENES_MAX:
+            if type(n) is not int or not least <= n <= GENES_MAX:
                 raise UserError(
                     f"network '{self.name}': expected {key}, a whole number from "
                     f"{least} to {GENES_MAX}, got {n!r}"

@@ -7,6 +7,7 @@ while minimizing both the angular velocity and robot-distance to the wall") is
 function in a file of the user's, `my.py:name`.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -97,6 +98,11 @@ class StepFitness:
         return worth
 
 
+def of_most(fitness: float, most: float | None) -> str:
+    """Text of a fitness, and of the most that it could be if that is known."""
+    return f"{fitness:.1f}" + ("" if most is None else f" of {most:g}")
+
+
 def fast(action: np.ndarray) -> np.ndarray:
     """Forward drive v in [0, 1], `(...,)`."""
     return action[..., 0]
@@ -160,7 +166,8 @@ def _step_fitness(name: str) -> StepFitness:
     if not callable(function):
         raise UserError(f"fitness '{name}': expected a function, got {function!r}")
     maximum = getattr(function, "maximum", None)
-    if maximum is not None and not isinstance(maximum, int | float):
+    known = type(maximum) in (int, float) and math.isfinite(maximum)
+    if maximum is not None and not known:
         raise UserError(
             f"fitness '{name}': expected a number as its maximum, got {maximum!r}"
         )

@@ -18,7 +18,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse, word
 from epuck_mj.host.files import is_file
 from epuck_mj.host.yaml_and_json import read_yaml
-from epuck_mj.policies.file import load_controller
+from epuck_mj.policies.file import champion_file, load_controller
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.conditions import ConditionFlags, Conditions
@@ -62,9 +62,10 @@ def view(argv: Sequence[str]) -> int:
     task = TaskParameters()
     conditions = options.robots.conditions
     if options.champion is not None:
-        file = load_controller(options.champion)
+        champion = champion_file(options.champion)
+        file = load_controller(champion)
         policy, task = file.controller, file.task
-        conditions = conditions or _evolved_with(options.champion)
+        conditions = conditions or _evolved_with(champion)
     if options.seconds is not None:
         ratio = options.seconds / task.control_step
         if not 0.5 <= ratio < float("inf"):

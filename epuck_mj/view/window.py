@@ -17,6 +17,7 @@ from epuck_mj.rungs.disturbed import disturbed
 from epuck_mj.rungs.watched_robot import WatchedRobot
 from epuck_mj.step.control import Policy, TaskParameters, drive
 from epuck_mj.step.disturbances import Disturbances
+from epuck_mj.step.fitness import of_most
 
 LATE_MAX = 0.2
 """Delay of the picture beyond which lost time is not made up for [s]."""
@@ -78,7 +79,7 @@ def watch(
                 return
         end = "crash" if crashed else "no crash"
         yield (
-            f"trial {number}: fitness {fitness:.1f} of {task.steps}, {end} after "
+            f"trial {number}: fitness {of_most(fitness, task.most)}, {end} after "
             f"{n_steps * task.control_step:.1f} s"
         )
 

@@ -13,6 +13,7 @@ from pydantic import BaseModel, Field, StrictFloat, StrictInt, ValidationError
 
 from epuck_mj.errors import UserError
 from epuck_mj.scene.model_files import WHEELED_ROBOT
+from epuck_mj.step.fitness import of_most
 
 
 class _Record(BaseModel, frozen=True, allow_inf_nan=False):
@@ -124,11 +125,10 @@ class Scores(_Record, frozen=True):
         """
         first, *others = sorted(self.held_out, key=lambda robot: robot != WHEELED_ROBOT)
         test = self.held_out[first]
-        of = "" if most is None else f" of {most:g}"
         lines = [
-            f"The champion earns {test.mean:.1f}{of}: the mean of {test.starts:,} "
-            f"fresh starts on {first}; {test.crash_rate:.0%} of the trials end in a "
-            "crash"
+            f"The champion earns {of_most(test.mean, most)}: the mean of "
+            f"{test.starts:,} fresh starts on {first}; {test.crash_rate:.0%} of the "
+            "trials end in a crash"
         ]
         if others:
             lines.append(f"On {_in_words({o: self.held_out[o] for o in others})}")

@@ -12,6 +12,7 @@ from epuck_mj.host.command_line import shell_command
 from epuck_mj.host.files import writing
 from epuck_mj.scene.model import Scene
 from epuck_mj.show.recording import Trial, save_recording
+from epuck_mj.step.fitness import of_most
 from evolution.named_policies import NamedPolicy, described
 from evolution.replay.options import Options
 from evolution.replay.viewer import display_there, open_viewer
@@ -25,10 +26,8 @@ def outcome(trial: Trial) -> str:
     """Line with the fitness and the end of a trial."""
     trajectory = trial.trajectory
     end = f", crash after {trajectory.time[-1]:.1f} s" if trajectory.crashed else ""
-    return (
-        f"{trial.name}: fitness {trajectory.trial_fitness:.1f} of {trial.task.steps}"
-        + end
-    )
+    fitness = of_most(trajectory.trial_fitness, trial.task.most)
+    return f"{trial.name}: fitness {fitness}{end}"
 
 
 def text_panel(trials: Sequence[Trial], policies: Sequence[NamedPolicy]) -> str:

@@ -4,6 +4,7 @@ import numpy as np
 
 from epuck_mj.bridge.drive.robot import RealRobot
 from epuck_mj.bridge.drive.session import Session, Step
+from epuck_mj.step.fitness import of_most
 
 
 def live_line(step: Step, robot: RealRobot) -> str:
@@ -34,6 +35,7 @@ def drive_summary(session: Session, robot: RealRobot) -> str:
         f"{robot.n_repairs} resynchronisations"
     ]
     if steps:
+        most = session.task.most_in(len(steps))
         latency = 1000 * np.array([step.moment.latency for step in steps])
         compute = 1000 * np.array([step.compute for step in steps])
         lines += [
@@ -41,6 +43,6 @@ def drive_summary(session: Session, robot: RealRobot) -> str:
             f"{np.percentile(latency, 95):.1f} ms, longest {latency.max():.1f} ms",
             f"compute        95 % {np.percentile(compute, 95):.2f} ms a step",
             f"odometry       {robot.odometry.length:.3f} m",
-            f"fitness        {fitness:.1f} of {len(steps)}, estimated",
+            f"fitness        {of_most(fitness, most)}, estimated",
         ]
     return "\n".join(lines)
