@@ -170,7 +170,7 @@ def _best_individuals(run: RunDirectory, generations: str) -> list[NamedPolicy]:
 
 
 def _indices(generations: str, n: int) -> Iterator[int]:
-    """Numbers of the `n` generations that a text names."""
+    """Numbers of the generations that a text names; there are `n` generations."""
     for word in generations.split(","):
         index = n - 1 if word.strip() == LAST else _number(word)
         if index is None or index >= n:

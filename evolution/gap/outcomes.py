@@ -37,7 +37,10 @@ def ideal(
     threads: int,
     arena: str | None = None,
 ) -> list[Outcome]:
-    """Outcomes of policies on ideal robots, on `n` test starts."""
+    """Outcomes of policies on ideal robots, on `n` test starts.
+
+    Each drives in `arena`, or in the one that it evolved in if that is None.
+    """
     scenes = cache(lambda arena, step: load_scene(robot, arena, step))
     free = cache(FreeSpace)
     outcomes = []

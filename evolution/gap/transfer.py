@@ -17,7 +17,7 @@ SHARE_KEPT = 0.8
 """Least share of its fitness that a policy keeps in a world it masters."""
 
 COLLISIONS_MAX = 1.0
-"""Collisions per minute at which a policy has not mastered a world."""
+"""Collisions per minute from which on a policy has not mastered a world."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,7 +43,7 @@ class Judges:
         self._made: dict[tuple[str, Setting], Judge] = {}
 
     def add(self, robot: str, setting: Setting, scene: Scene, space: FreeSpace) -> None:
-        """Add a judge that uses an existing scene and engine.
+        """Add a judge that uses an existing scene and free space.
 
         Args:
             robot: name or path of the robot.
@@ -58,8 +58,8 @@ class Judges:
         """The judge of a robot, given by name or path, in a setting.
 
         Raises:
-            UserError: if the robot cannot use the arena, the arena has no room, or a
-                wall of which no clearance can be measured.
+            UserError: if the robot cannot use the arena, the arena has no room, or it
+                has a wall of which no clearance can be measured.
         """
         if (robot, setting) not in self._made:
             scene = load_scene(robot, setting.arena, setting.task.control_step)

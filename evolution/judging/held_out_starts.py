@@ -34,7 +34,8 @@ def held_out_disturbances(
 ) -> Disturbances | None:
     """Disturbances of champions in `n` held-out trials of `steps` control steps.
 
-    The first are the same for any `n` up to the default; for more, all are others.
+    The first trials have the same disturbances for every `n` up to the default number
+    of starts; for a larger `n`, all of them have others.
     """
     least = N_VALIDATION if purpose == Purpose.VALIDATION else N_TEST
     drawn = disturbances(conditions, max(n, least), steps, HELD_OUT_SEED, purpose)

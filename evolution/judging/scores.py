@@ -118,7 +118,7 @@ class Scores(_Record, frozen=True):
     held_out_as_evolved: Mapping[str, HeldOut] = {}
 
     def in_lines(self, most: float | None) -> str:
-        """Lines with the champion's held-out fitness, and why others are higher.
+        """Lines with the champion's held-out and stored fitness, and why these differ.
 
         Args:
             most: fitness that a trial can reach; None if that is not known.

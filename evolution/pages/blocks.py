@@ -60,7 +60,7 @@ class Listing:
 
 @dataclass(frozen=True)
 class Contents:
-    """Links to headings, whose texts these are."""
+    """Links to the headings with these texts."""
 
     headings: Sequence[str]
 
@@ -108,13 +108,13 @@ SECTION = 2
 """Level of the headings that a list of contents names."""
 
 BOUNDS = r"[\[(][\d.,% -]+[\])]"
-"""What stands behind a number, and in one line: an interval or a sample."""
+"""Pattern of an interval or a sample after a number, which stays in one line."""
 
 WIDE = 54
-"""Letters side by side that a phone does not show."""
+"""Width in letters above which a table does not fit the screen of a phone."""
 
 GAP = 3
-"""Letters that have room between two columns."""
+"""Room between two columns, in letters."""
 
 
 def with_contents(blocks: Sequence[Block]) -> list[Block]:
@@ -175,7 +175,7 @@ def _escaped(text: str) -> str:
 
 
 def _begun(text: str) -> str:
-    """Plain text escaped for the beginning of a block in Markdown."""
+    """Plain text escaped for the beginning of a block, where more marks count."""
     marks = r"^(?=[-+#>])|^\d+(?=[.)](?: |$))"
     return re.sub(marks, r"\g<0>\\", _escaped(text))
 
@@ -217,7 +217,7 @@ def to_html(title: str, blocks: Sequence[Block]) -> str:
 
 
 def _letters(table: Table) -> int:
-    """Width of a table whose cells are broken wherever they can be, in letters."""
+    """Least width of a table, with its cells wrapped, in letters."""
     columns = zip(table.columns, *table.rows, strict=True)
     return sum(
         GAP + max(len(word) for cell in cells for word in _words(cell))

@@ -41,7 +41,10 @@ PRINT: dict[Any, Any] = {
     # equal figures make equal files
     "svg.hashsalt": "epuck-mj",
 }
-"""Settings of matplotlib with which figures are made and saved."""
+"""Settings of matplotlib with which figures are made and also saved.
+
+Also saved, because matplotlib makes ticks only when it draws.
+"""
 
 HANDLE, LETTER = 0.5, 0.054
 """Width of a legend's handle with its gaps, and of a letter beside it [inch]."""

@@ -70,7 +70,7 @@ def robot_name(robot: str) -> str:
 
 
 def numbered(n: int, noun: str) -> str:
-    """So many of something: 1 run, 2 runs."""
+    """A number with its noun: 1 run, 2 runs."""
     return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
 
 
@@ -114,12 +114,12 @@ def between(interval: Interval, form: str = ".2f") -> str:
 
 
 def percent(share: float | None) -> str:
-    """Text of a share in percent, for a column that says so; None, nan are unknown."""
+    """Text of a share in percent, without the sign; `NOTHING` for None and nan."""
     return NOTHING if share is None or math.isnan(share) else f"{100 * share:.1f}"
 
 
 def percent_median(shares: np.ndarray) -> str:
-    """The median of shares `(n,)` in percent, for a column that says so."""
+    """Text of the median of shares `(n,)` in percent, without the sign."""
     return percent(float(np.median(shares)) if shares.size else None)
 
 

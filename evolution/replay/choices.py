@@ -39,8 +39,8 @@ class Starts:
         poses: `(n, 3)`: x, y [m], yaw [rad].
         purpose: of the held-out starts that they are among.
         first: number of the first among them.
-        typical_of: among how many the first policy has its median fitness here; 0 if
-            the starts were asked for.
+        typical_of: number of test starts among which the first policy has its median
+            fitness on this one; 0 if the starts were not chosen by fitness.
     """
 
     names: tuple[str, ...]
@@ -60,7 +60,7 @@ def numbered_starts(spec: str, scene: Scene, clearance: float) -> Starts:
     """Starts by name, such as `test:0-9` or `validation:3`.
 
     Raises:
-        UserError: if it names none.
+        UserError: if `spec` names no starts.
     """
     sizes = {"test": N_TEST, "validation": N_VALIDATION}
     found = re.fullmatch(r"(\w+):(\d{1,9})(?:-(\d{1,9}))?", spec)

@@ -15,7 +15,10 @@ SETTLING_TIME = 2.0
 
 
 BINARIES = ("rerun", "rerun.exe", "Rerun.app/Contents/MacOS/Rerun")
-"""Paths of the viewer's program in rerun's package."""
+"""Paths of the viewer's program in rerun's package.
+
+Not the package's Python script, which starts this program but does not stop it.
+"""
 
 
 def viewer_binary() -> Path:
@@ -33,7 +36,7 @@ def viewer_binary() -> Path:
 
 
 def display_there() -> bool:
-    """Whether there is a display to open a window on."""
+    """Whether there is a display for a window, as far as the environment says."""
     if sys.platform in ("darwin", "win32"):
         return "SSH_CONNECTION" not in os.environ
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

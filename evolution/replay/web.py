@@ -39,7 +39,7 @@ def write_page(folder: Path) -> None:
 
 
 def server(folder: Path) -> http.server.ThreadingHTTPServer:
-    """Serve the folder to this machine only, on a free port."""
+    """A server of the folder for this machine only, on a free port."""
     handler = functools.partial(_Quiet, directory=str(folder))
     return http.server.ThreadingHTTPServer((LOOPBACK, 0), handler)
 

@@ -19,7 +19,7 @@ Column = tuple[Callable[[T], Any], str, str]
 """How to get a value, its unit, and what it means."""
 
 FITNESS = "fitness"
-"""Unit of fitness, until the highest one is known."""
+"""Stands for the unit of fitness, which names the highest fitness of a study."""
 
 
 def control_steps(run: RunData) -> int | None:
@@ -105,7 +105,7 @@ RUN_COLUMNS: Mapping[str, Column[RunData]] = {
 
 
 def run_rows(data: StudyData) -> list[dict[str, Any]]:
-    """A row per run, its columns as `described_columns` says; None: it does not say."""
+    """A row per run with `described_columns`; None where a run has no such value."""
     return [
         _run_row(data, name, run)
         for name, runs in data.with_runs.items()
@@ -114,7 +114,7 @@ def run_rows(data: StudyData) -> list[dict[str, Any]]:
 
 
 def described_columns(data: StudyData) -> list[dict[str, str]]:
-    """What the columns of `run_rows` are, in their order: a row each."""
+    """Name, unit and meaning of each column of `run_rows`, in their order."""
     found = {
         "experiment": ("", "name of the experiment"),
         "seed": ("", "seed of the run"),
@@ -133,7 +133,7 @@ def described_columns(data: StudyData) -> list[dict[str, str]]:
 
 
 def _prefixes(data: StudyData) -> dict[str, str]:
-    """Begin of the columns of each robot, which may be a user's file."""
+    """Beginning of the column names of each robot, by the robot's name or path."""
     found: dict[str, str] = {}
     for robot in shown_robots(data):
         name = re.sub("[^a-z0-9]+", "_", Path(robot).stem.lower()).strip("_") or "robot"

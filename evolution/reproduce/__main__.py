@@ -1,4 +1,4 @@
-"""The whole study by one command: `python -m evolution.reproduce --quick`.
+"""The whole study by one command: `python -m evolution.reproduce --quick | --full`.
 
 Runs the study, reports it, and tests each of the paper's claims on it.
 """

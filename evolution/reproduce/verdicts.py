@@ -34,7 +34,7 @@ def of_order(pair: Comparison) -> str:
 
 
 def of_most(holds: np.ndarray) -> tuple[str, str]:
-    """Verdict on whether something holds in most runs `(n,)`."""
+    """In how many runs `(n,)` something holds, and the verdict on whether most."""
     share = wilson(int(holds.sum()), holds.size)
     ours = f"{holds.sum()} of {holds.size} runs [{share.low:.0%}, {share.high:.0%}]"
     if holds.size < FEWEST_FOR_STARS:
@@ -45,10 +45,11 @@ def of_most(holds: np.ndarray) -> tuple[str, str]:
 
 
 def of_best(sample: np.ndarray, best: float, replicates: int) -> tuple[str, str]:
-    """Verdict on whether the best of other runs can come from runs like ours.
+    """The rank of the best of other runs among ours, and the verdict on it.
 
-    That it may is all that runs can say. Above all of ours it may be luck for long: of
-    three more runs the best is so with a probability of 3 / (n + 3).
+    At best, our runs do not contradict that it came from runs like ours. A best above
+    all of ours may still be luck: with a probability of 3 / (n + 3), the best of three
+    more runs like ours exceeds all `n`.
 
     Args:
         sample: of our runs, `(n,)`.

@@ -31,10 +31,10 @@ def locked(directory: Path, patience: float = 0.0) -> Iterator[None]:
 
     Args:
         directory: made if it is not there.
-        patience: how long to wait for one that is there [s].
+        patience: how long to wait for another process to leave [s].
 
     Raises:
-        UserError: if one is there all that time, or the directory cannot be made.
+        UserError: if another process stays, or the directory cannot be made.
     """
     with files.writing():
         directory.mkdir(parents=True, exist_ok=True)
@@ -56,7 +56,7 @@ def locked(directory: Path, patience: float = 0.0) -> Iterator[None]:
 
 
 class RunDirectory:
-    """Files of a run; all others can be derived from the checkpoint."""
+    """Files of a run, which is resumed from its config and checkpoint."""
 
     def __init__(self, path: Path):
         """Name the directory, without touching it."""
@@ -81,7 +81,7 @@ class RunDirectory:
         """Refuse a directory that is not empty.
 
         Raises:
-            UserError: if it does, or is not a directory.
+            UserError: if it is not empty, or not a directory.
         """
         try:
             used = self.path.is_dir() and bool(self._names())
@@ -141,7 +141,7 @@ class RunDirectory:
 
         Raises:
             UserError: if the checkpoint cannot be read or belongs to something else,
-                or the models have been edited since.
+                or robot, arena or a user's own part has been edited since.
         """
         first = self.provenance_fields() or provenance
         self._refuse_other_models(first, provenance)

@@ -80,7 +80,7 @@ class Evolution:
         if isinstance(engine, str):
             engine = make_engine(engine, self.scene, config, threads)
         self.engine = engine
-        # who can only lose is known only where there is a most to be won
+        # that an individual can only lose shows only if fitness has a maximum
         self.racing = racing and config.task.step_fitness.maximum is not None
         self.optimizer = _optimizer(config)
         self.records: list[Record] = []

@@ -1,6 +1,7 @@
 """Bounds rules: how genes outside the bounds are moved.
 
-The paper does not say what happens to them. With CR = 1 and F = 0.8 they are common.
+The paper does not say what happens to them. In its differential evolution, with CR = 1
+and F = 0.8, they are common.
 """
 
 from collections.abc import Callable, Mapping
@@ -66,7 +67,7 @@ def check_bounds_rule(name: str) -> None:
     """Refuse the name of an unknown rule.
 
     Raises:
-        ValueError: there is none.
+        ValueError: there is no rule of that name.
     """
     if name not in BOUNDS_RULES:
         available = ", ".join(BOUNDS_RULES)

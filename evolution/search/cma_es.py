@@ -3,8 +3,8 @@
 Each search is a `cmaes.CMA` that starts at a random mean in the initial range. When it
 has converged, which `cmaes` detects, or when it only follows noise, which
 `has_stagnated` detects, the next generation starts another one with twice the
-population. A genome
-outside the bounds is drawn again up to 100 times, then clipped, by `cmaes`.
+population. A genome outside the bounds is drawn again up to 100 times, then clipped, by
+`cmaes`.
 
 A `cmaes.CMA` cannot be saved without pickle or its private attributes. But it is a
 function of its seed and of what it was told: that is the state, and it is restored by
@@ -115,7 +115,7 @@ class CmaEs(Optimizer):
         return self._cma.population_size
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
-        """Make the generation asked the current one; restart if it is stuck."""
+        """Make the generation asked the current one; restart without progress."""
         # it minimises
         costs = (-made_finite(told)).tolist()
         self._cma.tell(list(zip(asked, costs, strict=True)))

@@ -29,7 +29,7 @@ ALPHA = np.exp(1 / 3)
 """Factor of sigma after a success, which four failures undo."""
 
 SIGMA_MIN = 1e-12
-"""Smallest sigma, as a share of the width of the bounds."""
+"""Smallest sigma, as a share of the width of the bounds; the rule itself has none."""
 
 
 def one_fifth_rule(

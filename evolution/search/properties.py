@@ -1,4 +1,4 @@
-"""Properties that every optimiser has to have, as functions that anybody can call.
+"""Properties that every optimiser has to have, and a function that checks them.
 
     check_optimizer("my.py:Swarm")
 
@@ -39,14 +39,14 @@ Property = Callable[[Make], None]
 
 
 def check_optimizer(algorithm: str, **parameters: Any) -> None:
-    """Nothing, if an optimiser has all properties that it has to have.
+    """Refuse an optimiser that lacks one of the properties.
 
     Args:
         algorithm: `my.py:Class`, or a shipped one.
-        parameters: of it, where they are not the defaults.
+        parameters: those that differ from its defaults.
 
     Raises:
-        UserError: naming the first property that it has not.
+        UserError: naming the first property that it lacks.
     """
     make = Make(parameters_kind(algorithm)(**parameters))
     for name, holds in PROPERTIES.items():
@@ -72,20 +72,20 @@ def evolved(optimizer: Optimizer, generations: int, fitness: Fitness = sphere):
 
 
 def require(condition: object, otherwise: str) -> None:
-    """Nothing, if the condition holds.
+    """Refuse a condition that does not hold.
 
     Raises:
-        AssertionError: if it does not.
+        AssertionError: with the text `otherwise`.
     """
     if not condition:
         raise AssertionError(otherwise)
 
 
 def refused(kind: type[Exception], words: str, call: Callable[..., Any], *given: Any):
-    """Nothing, if a call is refused in those words.
+    """Require that a call raises an error of this kind with these words.
 
     Raises:
-        AssertionError: if it is not.
+        AssertionError: if the call succeeds, or the words are others.
     """
     try:
         call(*given)
@@ -96,7 +96,7 @@ def refused(kind: type[Exception], words: str, call: Callable[..., Any], *given:
 
 
 def same(a: Optimizer, b: Optimizer) -> None:
-    """Nothing, if two are equal in every array, and in what they ask next."""
+    """Require that two are equal in every array, and in what they ask next."""
     left, right = a.state(), b.state()
     require(left.keys() == right.keys(), "the states have other names")
     for key in left:
@@ -299,4 +299,4 @@ PROPERTIES: Mapping[str, Property] = MappingProxyType(
         "a generation of nothing but the worst is survived": _only_the_worst,
     }
 )
-"""What has to hold, by its name."""
+"""Checks of the properties, by what has to hold."""

@@ -91,11 +91,11 @@ def parameters_kind(algorithm: str) -> type:
 def own_parameters(algorithm: str) -> type:
     """The parameters class of a user's `Optimizer`, with its `algorithm`.
 
-    They are a frozen dataclass, the attribute `Parameters` of that class, in which
+    The user's class has them as its attribute `Parameters`: a frozen dataclass in which
     everything has a default.
 
     Raises:
-        UserError: if they are anything else.
+        UserError: if the class is no `Optimizer`, or its `Parameters` are otherwise.
     """
     kind = own_part(algorithm).value
     if not (isinstance(kind, type) and issubclass(kind, Optimizer)):

@@ -84,8 +84,8 @@ class ExperimentConfig(BaseModel):
     )
     noise: NoiseLevel = Field(
         "none",
-        description="sensors and motors: none (ideal), calibrated (with the noise "
-        "measured on real robots) or strong (with more noise)",
+        description="sensors and motors: none (ideal), calibrated (with the noise of "
+        "real ones) or strong (with more noise)",
     )
     randomise: StrictBool = Field(
         False, description="give each trial a different robot; needs noise"
@@ -239,7 +239,7 @@ class ExperimentConfig(BaseModel):
 
 
 def _kind_for(fields: Any) -> tuple[type[ExperimentConfig], Any]:
-    """The config class for these fields, and the fields with an absolute path.
+    """The config class for these fields, and the fields with the optimiser's full path.
 
     Raises:
         UserError: if they name a user's optimiser that cannot be loaded.
@@ -258,7 +258,7 @@ def config_of_own_optimizer(algorithm: str) -> type[ExperimentConfig]:
     """`ExperimentConfig` with the parameters of a user's optimiser.
 
     Raises:
-        UserError: if it cannot be loaded.
+        UserError: if the optimiser cannot be loaded.
     """
     kind = own_parameters(algorithm)
     return create_model(

@@ -20,6 +20,7 @@ N_TEST = 1000
 """Default number of starts on which a champion is tested."""
 
 STARTS_MAX = 100_000
+"""Most starts on which a champion is chosen, and on which it is tested."""
 
 FEEDFORWARD = "feedforward"
 """Name of the paper's network, with the configuration's hidden neurons and biases."""
@@ -42,10 +43,10 @@ NetworkName = Annotated[str, _one_of(FEEDFORWARD), word("NETWORK")]
 
 
 def _of_known_algorithm(value: Any) -> Any:
-    """Refuse a `value` without a known algorithm.
+    """The parameters `value`, if they name a shipped algorithm.
 
     Raises:
-        ValueError: if it does not.
+        ValueError: if they name none, or an unknown one.
     """
     if isinstance(value, dict):
         algorithm = value.get("algorithm")
@@ -71,7 +72,7 @@ def _calibration(value: Any) -> Any:
     """Calibration from keys in the config, or from a file, whose keys are kept.
 
     Raises:
-        ValueError: if it is none.
+        ValueError: if keys or file are no calibration.
     """
     if value is None or isinstance(value, Calibration):
         return value
@@ -84,7 +85,7 @@ def _calibration(value: Any) -> Any:
 
 
 def _calibration_flag(value: str) -> Calibration | None:
-    """Path that a flag names; `none` is the nominal robot."""
+    """Calibration in the file that a flag names; None (nominal robot) for `none`."""
     return None if value == "none" else Calibration.load(Path(value))
 
 

@@ -22,7 +22,7 @@ def shipped_with(key: str) -> Mapping[str, Path]:
 
 
 def shipped_experiments() -> Mapping[str, Path]:
-    """Files of the shipped experiments by name."""
+    """Files of the shipped experiments by name; studies are in the same folder."""
     return shipped_with("optimizer")
 
 

@@ -18,7 +18,7 @@ from evolution.statistics.estimates import (
 )
 
 INSIDE = 1e-12
-"""Distance from 0 and 1 within which no roots are looked for."""
+"""Distance kept from 0 and 1 in the search for roots: a value there is one itself."""
 
 
 def a12(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -43,7 +43,8 @@ def evaluations_to_target(
 def expected_running_time(hits: np.ndarray, spent: np.ndarray) -> float:
     """Evaluations per success if failed runs start again; inf without a success.
 
-    What all runs spent before they hit, or in vain, by the number that hit.
+    The evaluations of all runs, each up to its hit or to its end without one, divided
+    by the number of runs that hit.
 
     Args:
         hits: evaluations to the target, `(runs,)`, nan if never.

@@ -31,7 +31,8 @@ class StudyConfig:
     def load(cls, path: Path) -> Self:
         """Read a study from a file with the keys `experiments` and `common`.
 
-        Each experiment is a shipped one or a YAML file; what `common` says wins.
+        `experiments` is a list of shipped experiments and YAML files. `common` are keys
+        that all of them get, whatever their files say; it may be left out.
 
         Raises:
             UserError: if a file is missing or says something unknown.

@@ -109,7 +109,7 @@ def generations(job: Job, means: Means) -> Generator[int]:
 def carry_out_side_by_side(
     jobs: Sequence[Job], means: Means, n_processes: int
 ) -> Iterator[Event]:
-    """Do all jobs, some side by side; closing the generator ends the processes."""
+    """Do all jobs, at most `n_processes` at once; closing this ends the processes."""
     waiting = list(reversed(jobs))
     idle: list[_Worker] = []
     busy: dict[Connection, tuple[Job, _Worker]] = {}

@@ -22,7 +22,7 @@ TRIALS_SHOWN = 2
 """Trials shown of each champion."""
 
 TITLE_WIDTH = 22
-"""Letters that have room above a panel."""
+"""Most letters in a line above a panel."""
 
 MOST_COLUMNS = 2 * TRIALS_SHOWN
 """Panels side by side: the trials of two champions."""

@@ -103,7 +103,7 @@ def what_was_run_section(data: StudyData) -> list[Block]:
 
 
 def _validation_starts(data: StudyData) -> str:
-    """How many starts chose the champions, of all experiments."""
+    """Text with the number of validation starts, of all experiments."""
     numbers = sorted({config.validation_starts for config in data.configs.values()})
     return " or ".join(map(str, numbers))
 
@@ -120,7 +120,7 @@ def _steps(data: StudyData, name: str) -> np.ndarray:
 
 
 def scale_of(numbers: np.ndarray) -> tuple[float, str, str]:
-    """A scale in which the smallest of `(n,)` is no zero, its sign and its name."""
+    """Scale at which the smallest of `(n,)` is not rounded to 0, its sign and name."""
     smallest = numbers.min(initial=math.inf)
     if 1e5 <= smallest < math.inf:
         return 1e6, "M", "millions"

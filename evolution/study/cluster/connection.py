@@ -55,7 +55,7 @@ QUIET = {
         "critical"
     )
 }
-"""Environment that keeps workers on this machine quiet."""
+"""Setting that keeps workers on this machine quiet from their first import on."""
 
 
 class ClusterLost(UserError):
@@ -66,7 +66,7 @@ def check_address(address: str) -> None:
     """Refuse an invalid address of a cluster.
 
     Raises:
-        UserError: saying what is.
+        UserError: saying what is a valid one.
     """
     if not REMOTE.fullmatch(address) and not LOCAL.fullmatch(address):
         raise UserError(
@@ -121,7 +121,7 @@ class Cluster:
     def answers(self, futures: Collection[Future]) -> dict[Future, Any]:
         """Results or exceptions of the tasks that have ended.
 
-        Waits until there is one, but no longer than a while.
+        Waits until one has ended, but no longer than `LOOK_AFTER`.
 
         Raises:
             ClusterLost: as `n_threads`.
@@ -208,10 +208,10 @@ def connected(address: str) -> Iterator[Cluster]:
 
 
 def _greet(address: str) -> None:
-    """Refuse an address without an answering scheduler.
+    """Refuse an address where no scheduler answers: a client would wait forever.
 
     Raises:
-        UserError: if there is none.
+        UserError: if none answers.
     """
 
     async def greet() -> None:

@@ -46,7 +46,7 @@ class Requirements:
         """The requirements as met by this machine.
 
         Raises:
-            UserError: if robot or arena cannot be used, or an own part not be loaded.
+            UserError: if robot, arena or an own part cannot be used.
         """
         facts = {package: version(package) for package in DECIDING}
         facts["code of epuck-mj"] = code()
@@ -80,7 +80,7 @@ class Requirements:
 
 @cache
 def code() -> str:
-    """First digits of a hash of this project's Python files."""
+    """First digits of a hash of this project's Python, which no version identifies."""
     digest = hashlib.sha256()
     for package in (epuck_mj, evolution):
         root = Path(str(package.__file__)).parent
@@ -94,7 +94,7 @@ def requirements_of(config: ExperimentConfig) -> Requirements:
     """The requirements of a run, as met by this machine.
 
     Raises:
-        UserError: if robot or arena cannot be used.
+        UserError: as `Requirements.here`.
     """
     own = tuple(config.own_parts)
     return Requirements.here(config.robot, config.arena, config.control_step, own)

@@ -45,7 +45,7 @@ class ClusterEngine:
         """Store the requirements on workers.
 
         Raises:
-            UserError: if robot or arena cannot be used.
+            UserError: as `requirements_of`.
         """
         self._cluster = cluster
         self._required = requirements_of(config)

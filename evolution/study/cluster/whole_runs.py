@@ -144,7 +144,7 @@ def _keep(job: Job, found: Mapping[str, bytes]) -> None:
     """
     directory = RunDirectory(job.directory)
     first = [directory.config.name, directory.checkpoint.name]
-    # begun with the first two, the run could be gone on with; the last says it need not
+    # after a kill in between the first two can be resumed; the last ends the run
     last = directory.provenance.name
     middle = [name for name in found if name not in (*first, last)]
     with directory.locked(PATIENCE), files.writing():
