@@ -53,9 +53,10 @@ results: $(INSTALLED)
 
 # all pictures; the first needs EGL or OSMesa, the second a Vulkan driver
 figures: $(INSTALLED)
-	$(BIN)/python -m evolution.replay $(CHAMPION) --image docs/champion.png
+	$(BIN)/python -m evolution.replay $(CHAMPION) --starts test:0 \
+	  --image docs/champion.png
 	$(BIN)/python -m evolution.replay $(CHAMPION) --generations 0,10,50,last \
-	  --save runs/generations.rrd
+	  --starts test:0 --save runs/generations.rrd
 	$(BIN)/python -m evolution.replay.viewer_picture runs/generations.rrd \
 	  --output docs/replay.png --size 1400 875
 	$(BIN)/python -m evolution.report results/paper --output results/report-paper

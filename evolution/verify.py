@@ -155,8 +155,9 @@ def _edited(
     now = dict(judges.of(config.robot, config.setting).scene.sha256)
     if champion.origin.mjcf_sha256 != now:
         yield "its robot or arena has been edited since"
+    own = config.own_parts
     for name, sha256 in champion.origin.own_sha256.items():
-        if config.own_parts.get(name) != sha256:
+        if own.get(name) != sha256:
             yield f"'{name}' has been edited since"
 
 

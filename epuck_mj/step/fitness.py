@@ -165,7 +165,7 @@ def _step_fitness(name: str) -> StepFitness:
     function: Any = own_part(name).value
     if not callable(function):
         raise UserError(f"fitness '{name}': expected a function, got {function!r}")
-    maximum = getattr(function, "maximum", None)
+    maximum: Any = getattr(function, "maximum", None)
     known = type(maximum) in (int, float) and math.isfinite(maximum)
     if maximum is not None and not known:
         raise UserError(

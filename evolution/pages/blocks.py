@@ -123,13 +123,16 @@ def with_contents(blocks: Sequence[Block]) -> list[Block]:
     Raises:
         ValueError: if two sections have the same heading.
     """
-    places = [
-        i for i, b in enumerate(blocks) if isinstance(b, Heading) and b.level == SECTION
-    ]
-    titles = [b.text for b in blocks if isinstance(b, Heading) and b.level == SECTION]
+    sections = {
+        i: block.text
+        for i, block in enumerate(blocks)
+        if isinstance(block, Heading) and block.level == SECTION
+    }
+    titles = list(sections.values())
     if len({anchor(title) for title in titles}) < len(titles):
         raise ValueError(f"expected sections of different names, got {titles}")
-    return [*blocks[: places[0]], Contents(titles), *blocks[places[0] :]]
+    first = min(sections)
+    return [*blocks[:first], Contents(titles), *blocks[first:]]
 
 
 def anchor(heading: str) -> str:

@@ -97,14 +97,14 @@ def held_out_order(study: StudyData, robot: str) -> list[Claim]:
 
 
 @cache
-def _shipped() -> Mapping[str, ExperimentConfig]:
+def papers_experiments() -> Mapping[str, ExperimentConfig]:
     """The shipped experiments of the paper's study."""
     return StudyConfig.load(find_study(PAPER)).experiments
 
 
 def unlike(study: StudyData) -> list[str]:
     """Differences of experiments from the paper's except robots, a line each."""
-    shipped, lines = _shipped(), []
+    shipped, lines = papers_experiments(), []
     for name in PAPERS:
         if name not in study.configs:
             continue

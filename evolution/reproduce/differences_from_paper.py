@@ -1,8 +1,7 @@
 """Differences between the paper and the shipped experiments."""
 
 from evolution.pages.blocks import Block, Listing, Paragraph, Table
-from evolution.reproduce.claims import PAPER, unlike
-from evolution.study.config import StudyConfig, find_study
+from evolution.reproduce.claims import papers_experiments, unlike
 from evolution.study.data import StudyData
 
 DIFFERENCES = (
@@ -64,7 +63,7 @@ DIFFERENCES = (
 
 def differences_from_paper(study: StudyData) -> list[Block]:
     """Table of the differences, and differences of a study from the shipped one."""
-    shipped = StudyConfig.load(find_study(PAPER)).experiments
+    shipped = papers_experiments()
     best, ga = shipped["de-best"], shipped["ga"]
     values = {"base": best, "best": best.optimizer, "ga": ga.optimizer}
     rows = [[what, paper, here.format(**values)] for what, paper, here in DIFFERENCES]

@@ -147,8 +147,8 @@ def _options(argv: Sequence[str]) -> Options:
         type(default), f"python -m {MODULE}", argv, default, examples=EXAMPLES
     )
     if options.experiment != experiment:
-        first = shell_command(MODULE, options.experiment, "...")
-        raise UserError(f"expected the experiment as the first argument: {first}")
+        command = shell_command(MODULE, options.experiment, "...")
+        raise UserError(f"expected the experiment as the first argument: {command}")
     # a run can be resumed from anywhere
     options = replace(options, config=options.config.located())
     if options.resume is not None and options.output is not None:

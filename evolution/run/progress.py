@@ -29,7 +29,7 @@ class Progress:
         self._bar = self._new_bar(
             desc="Loading the simulator", bar_format="{desc} [{elapsed}]", leave=False
         )
-        self._ended = threading.Event()
+        self._ended, self._replacing = threading.Event(), threading.Lock()
         self._clock = threading.Thread(target=self._tick, daemon=True)
         if self._terminal:
             self._clock.start()
@@ -37,8 +37,7 @@ class Progress:
     def begin(self, budget: int, done: int) -> None:
         """Show the generations from now on, at `done` of `budget` evaluations."""
         self._budget, self._next_line = budget, done
-        self._bar.close()
-        self._bar = self._new_bar(total=budget, initial=done, unit="eval")
+        self._replace_bar(total=budget, initial=done, unit="eval")
 
     def update(self, record: "Record") -> None:
         """Show one more generation."""
@@ -69,18 +68,24 @@ class Progress:
             print(f"{text} ...", file=sys.stderr, flush=True)
             return
         if number == 0:
-            self._bar.close()
-            self._bar = self._new_bar(total=stages, unit="stage")
+            self._replace_bar(total=stages, unit="stage")
         self._bar.update(number - self._bar.n)
         self._bar.set_description(text)
 
     def _new_bar(self, **options: Any) -> tqdm:
         return tqdm(dynamic_ncols=True, disable=not self._terminal, **options)
 
+    def _replace_bar(self, **options: Any) -> None:
+        with self._replacing:
+            self._bar.close()
+            self._bar = self._new_bar(**options)
+
     def _tick(self) -> None:
         """Redraw the bar until the end."""
         while not self._ended.wait(TICK):
-            self._bar.refresh()
+            # a bar that is closed must not be drawn again
+            with self._replacing:
+                self._bar.refresh()
 
     def __enter__(self) -> Self:
         """Itself."""

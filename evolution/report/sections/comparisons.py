@@ -174,11 +174,7 @@ def _pair_table(data: StudyData, pairs: Sequence[Comparison]) -> Table:
 def _with_bounds(found: Interval, form: str) -> str:
     """A value, and its bounds if there are any."""
     value = f"{found.value:z{form}}"
-    return (
-        value
-        if math.isnan(found.low)
-        else f"{value} {between(found, form.lstrip('z'))}"
-    )
+    return value if math.isnan(found.low) else f"{value} {between(found, form)}"
 
 
 def numbers(pair: Comparison) -> str:
