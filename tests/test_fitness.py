@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from epuck_mj.errors import UserError
-from epuck_mj.step.fitness import FORMULAS, literal, product, step_fitness
+from epuck_mj.step.control import TaskParameters
+from epuck_mj.step.fitness import FORMULAS, literal, of_most, product, step_fitness
 
 
 def seen(nearest: float) -> np.ndarray:
@@ -48,3 +49,8 @@ def test_a_share_of_one_for_any_batch(name):
 def test_unknown_names_are_refused():
     with pytest.raises(UserError, match="'prose'; available: literal, product, or my"):
         step_fitness("prose")
+
+
+def test_a_fitness_is_said_of_the_most_there_is():
+    assert of_most(51.72, TaskParameters(steps=300).most) == "51.7 of 300"
+    assert of_most(51.72, None) == "51.7"

@@ -148,6 +148,21 @@ def test_no_display_is_one_line_and_status_2(champion):
     assert re.fullmatch(r"error: cannot open a window[^\n]*\n", result.stderr)
 
 
+def test_a_runs_folder_is_its_champion_with_the_noise_it_evolved_with(
+    champion, tmp_path, monkeypatch, capsys
+):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    folder = tmp_path / "run"
+    folder.mkdir()
+    shutil.copy(champion, folder / "champion.json")
+    (folder / "config.yaml").write_text("noise: calibrated\n")
+    for given in (folder, folder / "champion.json"):
+        with pytest.raises(UserError, match="cannot open a window"):
+            view.view(["arena", str(given)])
+        assert "driving with noise calibrated" in capsys.readouterr().out
+
+
 def test_bad_input_is_one_line(champion, capsys):
     for arguments, message in [
         (("moon",), "no arena 'moon'"),

@@ -34,7 +34,7 @@ class ReproduceOptions:
     Writes studies, reports and REPRODUCTION.md. Call it again to continue.
 
     Attributes:
-        quick: run three seeds with a twentieth of the budget, about ten minutes on two
+        quick: run three seeds with a twentieth of the budget, about 15 minutes on two
             cores. Shows only that everything works.
         full: run 30 seeds, and 3 seeds evolved on wheels, days on two cores.
         output: directory for everything that is written.
@@ -58,9 +58,9 @@ def reproduce_paper(argv: Sequence[str]) -> int:
         raise UserError("expected --study with --wheels")
     if [options.quick, options.full, options.study is not None].count(True) != 1:
         raise UserError(
-            "expected one of --quick (3 seeds, ten minutes on two cores), --full (30 "
-            "seeds, days on two cores) and --study (write the verdict on a study that "
-            "is there)"
+            "expected one of --quick (3 seeds, about 15 minutes on two cores), "
+            "--full (30 seeds, days on two cores) and --study (write the verdict on a "
+            "study that is there)"
         )
     study_names = [each.name for each in (options.study, options.wheels) if each]
     if len(set(study_names)) < len(study_names):
