@@ -176,13 +176,13 @@ def test_bodies_are_heavier_and_slide():
     robots = MujocoRobots(scene, 2, 1)
     robots.embody(np.array([1.0, 2.0]), np.array([1.0, 0.5]))
     model = scene.model
-    body, wheel = model.body(ROBOT_BODY).id, model.geom("wheel_left").id
+    body, wheel = model.body(ROBOT_BODY).id, model.geom("epuck/wheel_left").id
     mass, friction = (
         robots._batch.expand(name) for name in ("body_mass", "geom_friction")
     )
     np.testing.assert_allclose(mass[:, body], model.body_mass[body] * np.array([1, 2]))
     np.testing.assert_allclose(friction[:, wheel, 0], [0.9, 0.45])
-    shell = model.geom("shell").id
+    shell = model.geom("epuck/shell").id
     np.testing.assert_allclose(friction[:, shell], [model.geom_friction[shell]] * 2)
     # and the next robots have their own again
     robots.embody(np.ones(2), np.ones(2))

@@ -13,6 +13,7 @@ from matplotlib.patches import Polygon
 from epuck_mj.errors import UserError
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.outline import _outline, shell_outline, wall_outlines
+from epuck_mj.scene.robot_parts import SHELL
 from epuck_mj.show.figures import fitness_figure, trajectory_figure
 from epuck_mj.show.pictures import save_figure
 from epuck_mj.step.control import TaskParameters
@@ -116,7 +117,7 @@ def test_outlines_of_the_shipped_arena_and_robot(scene):
     inner = np.abs(walls).max(axis=1).min()
     assert 0.4 < inner < np.abs(walls).max() < 0.6
     radius = np.linalg.norm(shell_outline(scene), axis=1)
-    np.testing.assert_allclose(radius, scene.model.geom("shell").size[0], rtol=1e-9)
+    np.testing.assert_allclose(radius, scene.model.geom(SHELL).size[0], rtol=1e-9)
 
 
 SHAPES = """

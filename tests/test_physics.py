@@ -7,6 +7,7 @@ from mujoco.batch import Batch
 
 from epuck_mj import constants as c
 from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.robot_parts import PREFIX, SHELL, WHEELS
 
 OPEN = """<mujoco>
   <option timestep="0.01" integrator="implicitfast"/>
@@ -118,11 +119,11 @@ def test_shell_meets_walls_and_wheels_the_floor():
         mujoco.mj_step(model, data)
         names = ([model.geom(g).name for g in contact.geom] for contact in data.contact)
         seen |= {tuple(sorted(pair)) for pair in names}
-    assert ("shell", "wall_east") in seen
-    assert {pair for pair in seen if "shell" in pair} == {("shell", "wall_east")}
-    rest = {name for pair in seen if "shell" not in pair for name in pair}
-    wheels = {"wheel_left", "wheel_right"}
-    assert wheels <= rest <= wheels | {"floor", "support_front", "support_rear"}
+    assert (SHELL, "wall_east") in seen
+    assert {pair for pair in seen if SHELL in pair} == {(SHELL, "wall_east")}
+    rest = {name for pair in seen if SHELL not in pair for name in pair}
+    supports = {f"{PREFIX}support_front", f"{PREFIX}support_rear"}
+    assert {*WHEELS} <= rest <= {*WHEELS, "floor", *supports}
 
 
 def test_gyro_and_velocimeter(alone):
@@ -131,9 +132,9 @@ def test_gyro_and_velocimeter(alone):
     mujoco.mj_step(model, data, 100)
     mujoco.mj_step1(model, data)
     rate, speed = 2 * c.WHEEL_RADIUS / c.TRACK, 3 * c.WHEEL_RADIUS
-    np.testing.assert_allclose(data.sensor("gyro").data, [0, 0, rate], atol=0.05)
+    np.testing.assert_allclose(data.sensor("epuck/gyro").data, [0, 0, rate], atol=0.05)
     np.testing.assert_allclose(
-        data.sensor("velocimeter").data, [speed, 0, 0], atol=0.002
+        data.sensor("epuck/velocimeter").data, [speed, 0, 0], atol=0.002
     )
 
 

@@ -17,10 +17,10 @@ from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.geometry import drawn
 from epuck_mj.scene.model import load_scene
-from epuck_mj.scene.robot_parts import PROXIMITY
 from epuck_mj.show.colors import TRIALS
 from epuck_mj.show.recording import Trial, save_recording
 from epuck_mj.show.recording.entities import entities
+from epuck_mj.show.recording.signals import SENSORS
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.trials.phases import phases
 from epuck_mj.trials.recorder import record
@@ -247,8 +247,8 @@ def test_signals_hold_the_trajectory(two, scene, trajectory, network, root):
     output = np.stack([v, (w + 1) / 2], axis=1)
     hidden = [f"h{i}" for i in range(shown.hidden.shape[1])]
     expected = {
-        "observation": (shown.observation, PROXIMITY),
-        "proximity": (shown.proximity, PROXIMITY),
+        "observation": (shown.observation, SENSORS),
+        "proximity": (shown.proximity, SENSORS),
         "action": (shown.action, ["v", "w"]),
         "command": (shown.command, ["left", "right"]),
         "clearance": (1000 * clearance[:, None], None),

@@ -56,7 +56,7 @@ def test_no_start_touches_anything(scene):
     starts = FreeSpace(scene, CLEARANCE).sample(np.random.default_rng(1), 200)
     model, data = scene.model, mujoco.MjData(scene.model)
     walls = [g for g in range(model.ngeom) if model.geom(g).name.startswith("wall")]
-    shell = model.geom("shell").id
+    shell = model.geom("epuck/shell").id
     for start in starts:
         data.qpos[:] = scene.qpos(start)
         mujoco.mj_kinematics(model, data)

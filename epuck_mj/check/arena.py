@@ -11,20 +11,29 @@ from pathlib import Path
 import numpy as np
 
 from epuck_mj.check.at_rest import rest_findings
-from epuck_mj.check.findings import Finding, Place, Severity, Unusable, error
+from epuck_mj.check.drive import drive_findings
+from epuck_mj.check.findings import Finding, Place, Unusable, error, errors, info
+from epuck_mj.check.heights import heights_of
 from epuck_mj.check.parts import part_findings
 from epuck_mj.check.room import room_findings
-from epuck_mj.check.source import TOPIC, Source, compiled_source, read
+from epuck_mj.check.sight import sight_findings
+from epuck_mj.check.source import (
+    TOPIC,
+    geom_places,
+    place_of,
+    read,
+    settings_not_used,
+)
 from epuck_mj.check.speed import speed_findings
-from epuck_mj.check.walls import finite_findings, plane_findings, wall_findings
+from epuck_mj.check.walls import finite_findings, floor_findings, wall_findings
 from epuck_mj.errors import UserError
+from epuck_mj.scene.floor import BadGeom
 from epuck_mj.scene.model import Scene, load_scene
-from epuck_mj.scene.model_files import find_arena, find_robot
+from epuck_mj.scene.model_files import find_arena
+from epuck_mj.scene.source_files import SourceFiles
 from epuck_mj.scene.starts import FreeSpace, Grid, survey
+from epuck_mj.scene.xml_elements import BadXml
 from epuck_mj.step.control import START_CLEARANCE
-
-SUBSTEPS_MAX = 10_000
-"""Most physics steps in a control step: more would take too long."""
 
 N_STARTS = 8
 """Number of starts at which a robot is left at rest."""
@@ -77,38 +86,60 @@ def _check(arena: Path, robot: str) -> Report:
     findings: list[Finding] = []
     scene = grid = None
     try:
-        source = read(arena, find_robot(robot))
-        model, places = compiled_source(source)
-        findings += finite_findings(model, places) or plane_findings(model, places)
-        if not findings:
-            scene = _scene(source, robot)
-            findings += wall_findings(scene, places)
+        files = read(arena)
+        scene, places = _scene(files, robot)
+        findings += _settings(files)
+        findings += finite_findings(scene.model, places)
+        if not errors(findings):
             grid = _grid(scene)
+            heights = heights_of(scene)
+            findings += floor_findings(scene, places)
+            findings += wall_findings(scene, grid, places, heights)
+            if not errors(findings):
+                findings += sight_findings(scene, grid, places, heights)
             findings += room_findings(scene, grid)
-            if all(finding.severity is not Severity.ERROR for finding in findings):
-                findings += _robot_findings(scene, robot, source, places)
+            if not errors(findings):
+                findings += _robot_findings(scene, robot, places)
     except Unusable as problem:
         findings.append(problem.finding)
     return Report(arena, tuple(findings), scene, grid)
 
 
-def _scene(source: Source, robot: str) -> Scene:
-    """The scene, if a usable one can be made of the source.
+def _scene(files: SourceFiles, robot: str) -> tuple[Scene, tuple[Place, ...]]:
+    """The scene and the place of each geom, if a usable one can be made of an arena.
 
     Raises:
         Unusable: if not.
     """
-    step = source.setting("option", "timestep")
     try:
-        scene = load_scene(robot, str(source.scene.arena))
+        scene = load_scene(robot, str(files.main))
+    except BadGeom as problem:
+        place = geom_places(files)[problem.geom]
+        raise Unusable(error(TOPIC, problem.problem, place)) from None
+    except BadXml as problem:
+        raise Unusable(error(TOPIC, problem.problem, place_of(problem))) from None
     except UserError as problem:
-        place = step if "physics step" in str(problem) else Place(source.scene.arena)
-        raise Unusable(error(TOPIC, str(problem), place)) from None
-    if scene.n_substeps > SUBSTEPS_MAX:
-        text = f"a control step would be {scene.n_substeps:,} physics steps long; "
-        text += f"expected at most {SUBSTEPS_MAX:,}"
-        raise Unusable(error(TOPIC, text, step))
-    return scene
+        # it may have a line
+        geom_places(files)
+        raise Unusable(error(TOPIC, str(problem), Place(files.main))) from None
+    try:
+        known = geom_places(files)
+    except Unusable:
+        known = ()
+    unknown = (Place(files.main),) * scene.model.ngeom
+    return scene, (*known, *unknown)[: scene.model.ngeom]
+
+
+def _settings(files: SourceFiles) -> list[Finding]:
+    """Information about what the arena says of physics and is not used."""
+    shown = [
+        f"{element.shown} of line {element.line}"
+        for element in settings_not_used(files)
+    ]
+    if not shown:
+        return []
+    text = f"not used, since the robot brings its own physics: {', '.join(shown)}"
+    return [info(TOPIC, text)]
 
 
 def _grid(scene: Scene) -> Grid:
@@ -124,15 +155,15 @@ def _grid(scene: Scene) -> Grid:
 
 
 def _robot_findings(
-    scene: Scene, robot: str, source: Source, places: tuple[Place, ...]
+    scene: Scene, robot: str, places: tuple[Place, ...]
 ) -> list[Finding]:
     """Findings about a robot at starts, if the arena has any."""
     topic = f"robot {Path(robot).name}"
     rng = np.random.default_rng(SEED)
     starts = FreeSpace(scene, START_CLEARANCE).sample(rng, N_STARTS)
-    step = source.setting("option", "timestep")
     return [
         *part_findings(scene, starts[0], topic),
         *rest_findings(scene, starts, topic, places),
-        *speed_findings(scene, starts[0], topic, step),
+        *drive_findings(scene, starts, topic, Place(scene.arena)),
+        *speed_findings(scene, starts[0], topic),
     ]

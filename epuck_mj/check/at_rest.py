@@ -7,7 +7,7 @@ import numpy as np
 
 from epuck_mj.check.findings import Finding, Place, error, info, warning
 from epuck_mj.scene.model import Scene
-from epuck_mj.scene.robot_parts import ROBOT_BODY
+from epuck_mj.scene.robot_parts import PREFIX, ROBOT_BODY
 
 SETTLING = 1.0
 """How long a robot is left at rest [s]."""
@@ -104,6 +104,8 @@ def _pair(
 ) -> str:
     """Two geoms, by name or by line."""
     names = [
-        model.geom(geom).name or f"geom of line {places[geom].line}" for geom in pair
+        model.geom(geom).name.removeprefix(PREFIX)
+        or f"geom of line {places[geom].line}"
+        for geom in pair
     ]
     return " and ".join(names)

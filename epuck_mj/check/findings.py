@@ -1,5 +1,6 @@
 """Findings of a check: a line of text, its severity, and its place in the XML."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -63,6 +64,11 @@ def warning(topic: str, text: str, place: Place | None) -> Finding:
 def error(topic: str, text: str, place: Place | None) -> Finding:
     """A finding with which the arena cannot be used."""
     return Finding(topic, Severity.ERROR, text, place)
+
+
+def errors(findings: Iterable[Finding]) -> list[Finding]:
+    """The errors among findings."""
+    return [found for found in findings if found.severity is Severity.ERROR]
 
 
 class Unusable(UserError):

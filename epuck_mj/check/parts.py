@@ -6,6 +6,7 @@ import numpy as np
 from epuck_mj.check.findings import Finding, info
 from epuck_mj.constants import PROXIMITY_RANGE
 from epuck_mj.scene.model import Scene
+from epuck_mj.scene.robot_parts import PREFIX
 
 _SENSOR = mujoco.mjtSensor
 
@@ -28,7 +29,8 @@ def part_findings(scene: Scene, start: np.ndarray, topic: str) -> list[Finding]:
     where = f"start: x {x:.3f} m, y {y:.3f} m, heading {np.degrees(yaw):.0f} deg"
     readings: dict[int, list[str]] = {}
     for sensor in range(model.nsensor):
-        kind, name = int(model.sensor_type[sensor]), model.sensor(sensor).name
+        kind = int(model.sensor_type[sensor])
+        name = model.sensor(sensor).name.removeprefix(PREFIX)
         address, size = model.sensor_adr[sensor], model.sensor_dim[sensor]
         values = data.sensordata[address : address + size]
         readings.setdefault(kind, []).append(f"{name} {_shown(kind, values)}".strip())
@@ -46,9 +48,10 @@ def part_findings(scene: Scene, start: np.ndarray, topic: str) -> list[Finding]:
         limits = (
             f" {low:.2f} to {high:.2f}" if model.actuator_ctrllimited[actuator] else ""
         )
+        name = model.actuator(actuator).name.removeprefix(PREFIX)
         # of a velocity servo: the speed that it is told to keep
         speed = data.actuator_velocity[actuator]
-        actuators.append(f"{model.actuator(actuator).name}{limits}, now {speed:.2f}")
+        actuators.append(f"{name}{limits}, now {speed:.2f}")
     driven = f"actuators: {'; '.join(actuators)}"
     return [info(topic, where), *sensors, info(topic, driven)]
 

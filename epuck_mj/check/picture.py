@@ -8,7 +8,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from epuck_mj.scene.model import Scene
-from epuck_mj.scene.outline import shell_outline, wall_outlines
+from epuck_mj.scene.outline import geom_outlines, shell_outline, wall_outlines
+from epuck_mj.scene.robot_parts import ROBOT_BODY, static
 from epuck_mj.scene.starts import Grid
 from epuck_mj.show.colors import GREEN, ORANGE, fraction
 
@@ -44,11 +45,18 @@ def region_figure(scene: Scene, grid: Grid, title: str) -> Figure:
     axes.add_collection(
         PolyCollection(wall_outlines(scene), facecolor=WALL, edgecolor=WALL)
     )
+    moving = geom_outlines(scene, _moving(scene))
+    axes.add_collection(
+        PolyCollection(moving, facecolor="none", edgecolor=WALL, linestyle="--")
+    )
     shell = shell_outline(scene)
     legend: list[Patch | Line2D] = [
         Patch(facecolor=fraction(color), alpha=0.5, label=f"robot's middle {meaning}"),
         Patch(facecolor=WALL, label="walls"),
     ]
+    if moving:
+        things = Patch(fc="none", ec=WALL, ls="--", label="moves: no wall")
+        legend.append(things)
     if enclosed:
         # on the node farthest along the diagonal
         shell = shell + grid.nodes[grid.inside][-1]
@@ -62,3 +70,10 @@ def region_figure(scene: Scene, grid: Grid, title: str) -> Figure:
     axes.set(title=title, xlabel="x [m]", ylabel="y [m]", aspect="equal")
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     return figure
+
+
+def _moving(scene: Scene) -> np.ndarray:
+    """Which geoms of the arena move, `(ngeom,)`."""
+    model = scene.model
+    robot = model.body_rootid[model.geom_bodyid] == model.body(ROBOT_BODY).id
+    return ~static(model) & ~robot

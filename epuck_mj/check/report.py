@@ -5,7 +5,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from epuck_mj.check.findings import Finding, Place, Severity
+from epuck_mj.check.findings import Finding, Place, Severity, errors
 
 WIDTH = 88
 
@@ -29,7 +29,7 @@ def lines(arena: Path, findings: Sequence[Finding]) -> Iterator[str]:
 
 def usable(findings: Sequence[Finding]) -> bool:
     """Whether no finding is an error."""
-    return all(finding.severity is not Severity.ERROR for finding in findings)
+    return not errors(findings)
 
 
 def _wrapped(text: str) -> list[str]:

@@ -3,42 +3,31 @@
 import time
 from collections.abc import Iterator
 
-import mujoco
 import numpy as np
 
-from epuck_mj.check.findings import Finding, Place, info, warning
+from epuck_mj.check.findings import Finding, info
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.model import Scene
-from epuck_mj.scene.robot_parts import TIMESTEP
 from epuck_mj.step.control import ControlStep, TaskParameters, drive
 
 MEASURED = 0.15
 """Duration of each of the two measurements [s]."""
 
-CONVERGED = 0.01
-"""Longest physics step that is fine enough for the robot on wheels [s].
 
-Source: benchmarks/convergence.md.
-"""
-
-
-def speed_findings(
-    scene: Scene, start: np.ndarray, topic: str, place: Place
-) -> list[Finding]:
+def speed_findings(scene: Scene, start: np.ndarray, topic: str) -> list[Finding]:
     """Steps per second of one robot on one thread, from a start `(3,)` on.
 
     Args:
         scene: robot and arena.
         start: where the robot starts, and starts again after a crash.
         topic: heading of the findings.
-        place: where the physics step is set.
     """
     task = TaskParameters()
     physics, _ = _rates(_standing(scene, start))
     control, per_cpu = _rates(_driving(scene, start, task))
     n = scene.n_substeps
-    findings = [
+    return [
         info(
             topic,
             f"a control step of {task.control_step:g} s is {n} physics steps of "
@@ -51,19 +40,6 @@ def speed_findings(
             f"is {per_cpu * task.control_step:,.0f} simulated s per CPU second",
         ),
     ]
-    step = scene.model.opt.timestep
-    if step > CONVERGED and not _has_step(scene.model):
-        text = f"a physics step of {step:g} s is too coarse for wheels; "
-        findings.append(
-            warning(topic, f"{text}expected at most {CONVERGED:g} s", place)
-        )
-    return findings
-
-
-def _has_step(model: mujoco.MjModel) -> bool:
-    """Whether the robot has a physics step of its own."""
-    kind = mujoco.mjtObj.mjOBJ_NUMERIC.value
-    return mujoco.mj_name2id(model, kind, TIMESTEP) >= 0
 
 
 def _standing(scene: Scene, start: np.ndarray) -> Iterator[None]:

@@ -1,27 +1,23 @@
-"""Findings about walls, and whether rays see what the robot can hit.
-
-MuJoCo's rangefinders look for geoms of any group and any collision bits. They pass
-through those of alpha 0, where a material's alpha counts before the geom's own.
-"""
+"""Findings about the geoms of an arena, one by one."""
 
 from collections import Counter
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from epuck_mj.check.findings import Finding, Place, error, info, warning
-from epuck_mj.constants import PROXIMITY_RANGE
-from epuck_mj.scene.clearance import CONVEX
-from epuck_mj.scene.geometry import at_rest, box_around, kinematics, mesh, walls
+from epuck_mj.check.heights import Heights, extent, mm, seen_by_rays
+from epuck_mj.scene.clearance import MEASURED
+from epuck_mj.scene.geometry import at_rest, box_around_walls, mesh, walls
 from epuck_mj.scene.model import Scene
+from epuck_mj.scene.outline import geom_outlines, within
 from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL, can_touch, static
+from epuck_mj.scene.starts import Grid
 from epuck_mj.step.control import START_CLEARANCE
 
 TOPIC = "walls"
 NAMES_MAX = 6
-FLOOR_BITS = 'contype="2" conaffinity="2"'
 
 FAR = 1e4
 """Distance beyond any wall [m]."""
@@ -30,14 +26,6 @@ CONCAVE = 0.01
 """Share of a hull's volume that its mesh may leave empty and still count as convex."""
 
 _SHAPE = mujoco.mjtGeom
-
-
-@dataclass(frozen=True)
-class Heights:
-    """Heights in which a robot can hit and see [m]."""
-
-    shell: tuple[float, float]
-    rays: tuple[float, float]
 
 
 def finite_findings(model: mujoco.MjModel, places: tuple[Place, ...]) -> list[Finding]:
@@ -51,25 +39,20 @@ def finite_findings(model: mujoco.MjModel, places: tuple[Place, ...]) -> list[Fi
     ]
 
 
-def plane_findings(model: mujoco.MjModel, places: tuple[Place, ...]) -> list[Finding]:
-    """Errors for planes that the shell would hit: no scene can be made with them."""
-    planes = (model.geom_type == _SHAPE.mjGEOM_PLANE) & walls(model)
-    data = at_rest(model)
-    return [
-        error(
-            TOPIC,
-            f"the robot's shell would hit this plane; expected {FLOOR_BITS} for a floor"
-            if abs(data.geom_xmat[geom][8]) > 1 - 1e-9
-            else "a plane cannot be a wall; expected a box",
-            places[geom],
-        )
-        for geom in np.flatnonzero(planes).tolist()
-    ]
+def floor_findings(scene: Scene, places: tuple[Place, ...]) -> list[Finding]:
+    """Information about what is taken for the floor though its bits are a wall's."""
+    names = [places[geom].element or "<geom>" for geom in scene.floor]
+    if not names:
+        return []
+    text = f"taken as the floor, since level at height 0: {', '.join(names)}"
+    return [info("floor", text)]
 
 
-def wall_findings(scene: Scene, places: tuple[Place, ...]) -> list[Finding]:
+def wall_findings(
+    scene: Scene, grid: Grid, places: tuple[Place, ...], heights: Heights
+) -> list[Finding]:
     """Findings about the geoms of an arena."""
-    model, heights = scene.model, heights_of(scene)
+    model = scene.model
     robot = model.body_rootid == model.body(ROBOT_BODY).id
     findings = _found(model)
     for geom in np.flatnonzero(~robot[model.geom_bodyid]).tolist():
@@ -77,35 +60,14 @@ def wall_findings(scene: Scene, places: tuple[Place, ...]) -> list[Finding]:
         if not static(model)[geom]:
             findings += _moving(model, geom, place)
         elif walls(model)[geom]:
-            findings += _wall(model, geom, place, heights)
-        else:
-            findings += _no_wall(model, geom, place, heights)
+            findings += _wall(scene, grid, geom, place, heights)
     return findings
-
-
-def heights_of(scene: Scene) -> Heights:
-    """Where shell and rays of a robot are, upright on a floor at 0."""
-    model = scene.model
-    shell = np.arange(model.ngeom) == model.geom(SHELL).id
-    box = box_around(model, shell)
-    assert box is not None, "the shell is no plane"
-    _, _, origin, direction = kinematics(scene, np.zeros((1, 3)))
-    ends = origin[..., 2], (origin + PROXIMITY_RANGE * direction)[..., 2]
-    low, high = np.min(ends), np.max(ends)
-    return Heights((box[0][2], box[1][2]), (float(low), float(high)))
-
-
-def seen_by_rays(model: mujoco.MjModel) -> np.ndarray:
-    """Which geoms a rangefinder can hit, `(ngeom,)`; see `mj_ray`."""
-    alpha, material = model.geom_rgba[:, 3].copy(), model.geom_matid
-    alpha[material >= 0] = model.mat_rgba[material[material >= 0], 3]
-    return alpha > 0
 
 
 def _found(model: mujoco.MjModel) -> list[Finding]:
     """Findings about the walls' number, kinds and names, and the arena's size."""
     geoms = np.flatnonzero(walls(model)).tolist()
-    box = box_around(model, walls(model))
+    box = box_around_walls(model)
     if box is None:
         return []
     kinds = Counter(_kind(model, geom) for geom in geoms)
@@ -130,60 +92,27 @@ def _found(model: mujoco.MjModel) -> list[Finding]:
 
 
 def _wall(
-    model: mujoco.MjModel, geom: int, place: Place, heights: Heights
+    scene: Scene, grid: Grid, geom: int, place: Place, heights: Heights
 ) -> list[Finding]:
-    """Finding about a geom that the shell can hit, if it is no good wall."""
-    if _SHAPE(model.geom_type[geom]) not in CONVEX:
-        kind = _kind(model, geom)
+    """Finding about a geom that the shell can hit, if robots do not meet it."""
+    if _SHAPE(scene.model.geom_type[geom]) not in MEASURED:
+        kind = _kind(scene.model, geom)
         text = f"a wall cannot be of type {kind}: clearance to it has no measure"
         return [error(TOPIC, text, place)]
-    low, high = _extent(model, geom)
+    low, high = extent(scene.model, geom)
     if high <= heights.shell[0]:
-        return _below(high, place, heights)
-    if low >= heights.shell[1]:
-        text = f"the robot passes below it: it begins at {_mm(low)}"
-        text += f", the shell ends at {_mm(heights.shell[1])}"
-        return [warning(TOPIC, text, place)]
-    findings = _mesh(model, geom, place)
-    if not seen_by_rays(model)[geom]:
-        why = "alpha 0"
-        material = model.geom_matid[geom]
-        if material >= 0:
-            why += f" of material '{model.material(material).name}'"
-    elif high < heights.rays[0]:
-        why = f"it ends at {_mm(high)}, rays run at {_mm(heights.rays[0])}"
-    elif low > heights.rays[1]:
-        why = f"it begins at {_mm(low)}, rays run at {_mm(heights.rays[1])}"
+        if high > heights.shell[0] - START_CLEARANCE:
+            text = "it lies below the shell, which may start nowhere near it; expected "
+            return [error(TOPIC, f"{text}a floor at height 0", place)]
+        below = f"the robot passes above it: it ends at {mm(high)}"
+    elif low >= heights.shell[1]:
+        below = f"the robot passes below it: it begins at {mm(low)}"
+        below += f", the shell ends at {mm(heights.shell[1])}"
     else:
-        return findings
-    return [*findings, error(TOPIC, f"rays cannot see it: {why}", place)]
-
-
-def _below(high: float, place: Place, heights: Heights) -> list[Finding]:
-    """Finding about a geom with a wall's bits below the shell: probably a floor."""
-    if high > heights.shell[0] - START_CLEARANCE:
-        text = "it lies below the shell, which may start nowhere near it; "
-        text += f"expected {FLOOR_BITS} for a floor"
-        return [error(TOPIC, text, place)]
-    text = f"the robot passes above it: it ends at {_mm(high)}"
-    return [warning(TOPIC, text, place)]
-
-
-def _no_wall(
-    model: mujoco.MjModel, geom: int, place: Place, heights: Heights
-) -> list[Finding]:
-    """Finding about a geom that stands still and the shell cannot hit."""
-    if model.geom_type[geom] == _SHAPE.mjGEOM_PLANE:
-        in_sight = abs(at_rest(model).geom_xmat[geom][8]) < 1 - 1e-9
-    else:
-        low, high = _extent(model, geom)
-        in_sight = low < heights.rays[1] and high > heights.rays[0]
-    if not in_sight or not seen_by_rays(model)[geom]:
-        return []
-    bits = f'contype="{model.geom_contype[geom]}" '
-    bits += f'conaffinity="{model.geom_conaffinity[geom]}"'
-    text = f"rays see it, but the shell cannot hit it: {bits}; expected 1 of a wall"
-    return [warning(TOPIC, text, place)]
+        return _mesh(scene.model, geom, place)
+    (outline,) = geom_outlines(scene, np.arange(scene.model.ngeom) == geom)
+    meets = within(outline, grid.nodes[grid.inside]).any()
+    return [warning(TOPIC, below, place)] if meets else []
 
 
 def _moving(model: mujoco.MjModel, geom: int, place: Place) -> list[Finding]:
@@ -213,16 +142,5 @@ def _mesh(model: mujoco.MjModel, geom: int, place: Place) -> list[Finding]:
     return [warning(TOPIC, text, place)]
 
 
-def _extent(model: mujoco.MjModel, geom: int) -> tuple[float, float]:
-    """Lowest and highest point of a geom that is no plane [m]."""
-    box = box_around(model, np.arange(model.ngeom) == geom)
-    assert box is not None, "only planes have no box"
-    return float(box[0][2]), float(box[1][2])
-
-
 def _kind(model: mujoco.MjModel, geom: int) -> str:
     return _SHAPE(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
-
-
-def _mm(height: float) -> str:
-    return f"{height * 1000:.1f} mm"

@@ -30,6 +30,8 @@ from epuck_mj.step.fitness import StepFacts
 from epuck_mj.step.motors import command
 from epuck_mj.step.sensors import Reading, observe
 
+PhysicsError = control.PhysicsError
+
 SUITE = containers.TaggedTasks()
 
 

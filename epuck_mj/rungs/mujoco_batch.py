@@ -12,6 +12,7 @@ import numpy as np
 from mujoco.batch import Batch
 
 from epuck_mj.rungs.bodies import body_fields, wheel_limits
+from epuck_mj.rungs.warnings import heeded, silence
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.sensors import Reading
@@ -28,6 +29,7 @@ class MujocoRobots:
             capacity: the most robots that a reset can place.
             threads: threads that step them; 0 is one per core.
         """
+        silence()
         self.scene = scene
         self.capacity = capacity
         # one MjData each, so that sensors refreshed after a step are not
@@ -36,6 +38,7 @@ class MujocoRobots:
         self._qpos = self._batch.bind("qpos")
         self._ctrl = self._batch.bind("ctrl")
         self._sensordata = self._batch.bind("sensordata")
+        self._about, self._warned = np.moveaxis(self._batch.warning, -1, 0)
         self._active = np.zeros(0, np.int32)
         self._embodied = False
         self._threads = threads
@@ -61,13 +64,17 @@ class MujocoRobots:
 
         Args:
             command: wheel speeds [rad/s], `(active, 2)`.
+
+        Raises:
+            UserError: if MuJoCo warns of a simulation that means nothing.
         """
         self._ctrl[self._active[:, None], self.scene.wheels] = command
-        self._batch.step(
-            self._active,
-            nstep=self.scene.n_substeps,
-            stage=mujoco.mjtStage.mjSTAGE_VEL.value,
-        )
+        with heeded(self.scene, self._warned, self._about):
+            self._batch.step(
+                self._active,
+                nstep=self.scene.n_substeps,
+                stage=mujoco.mjtStage.mjSTAGE_VEL.value,
+            )
         return self._reading()
 
     def embody(self, mass: np.ndarray, friction: np.ndarray) -> None:

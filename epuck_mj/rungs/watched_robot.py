@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from epuck_mj.rungs.bodies import body_fields, wheel_limits
+from epuck_mj.rungs.warnings import heeded, silence
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.sensors import Reading
@@ -27,6 +28,7 @@ class WatchedRobot:
 
     def __init__(self, scene: Scene):
         """Allocate the robot."""
+        silence()
         self.scene = scene
         self.model = copy.copy(scene.model)
         self.data = mujoco.MjData(self.model)
@@ -44,10 +46,12 @@ class WatchedRobot:
     def step(self, command: np.ndarray) -> Reading:
         """Drive for one control step at wheel speeds `(1, 2)` [rad/s]."""
         self.data.ctrl[self.scene.wheels] = command[0]
+        warning = self.data.warning
         for _ in range(self.scene.n_substeps):
             # the second half first: positions and sensors are always those of now
-            mujoco.mj_step2(self.model, self.data)
-            mujoco.mj_step1(self.model, self.data)
+            with heeded(self.scene, warning.number, warning.lastinfo):
+                mujoco.mj_step2(self.model, self.data)
+                mujoco.mj_step1(self.model, self.data)
             self.moved()
         return self._reading()
 

@@ -33,7 +33,8 @@ ITERATIONS = 200
 
 _SHAPE, _SENSOR, _OBJECT = mujoco.mjtGeom, mujoco.mjtSensor, mujoco.mjtObj
 
-CONVEX = {
+MEASURED = {
+    _SHAPE.mjGEOM_PLANE,
     _SHAPE.mjGEOM_SPHERE,
     _SHAPE.mjGEOM_CAPSULE,
     _SHAPE.mjGEOM_ELLIPSOID,
@@ -117,11 +118,11 @@ def _walls_and_shell(scene: Scene) -> mujoco.MjModel:
     spec.option.ccd_tolerance, spec.option.ccd_iterations = TOLERANCE, ITERATIONS
     for geom in np.flatnonzero(walls(model)).tolist():
         shape = _SHAPE(model.geom_type[geom])
-        if shape not in CONVEX:
+        if shape not in MEASURED:
             name = shape.name.removeprefix("mjGEOM_").lower()
             raise UserError(
                 f"arena '{scene.arena}': no clearance to a wall that is a {name}; "
-                "expected box, cylinder, capsule, ellipsoid, sphere or mesh"
+                "expected plane, box, cylinder, capsule, ellipsoid, sphere or mesh"
             )
         _copy(spec, spec.worldbody, model, data, geom)
     robot = spec.worldbody.add_body(name=_ROBOT)

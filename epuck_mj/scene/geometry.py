@@ -56,6 +56,21 @@ def box_around(
     return (center - half).min(axis=0), (center + half).max(axis=0)
 
 
+def box_around_walls(
+    model: mujoco.MjModel,
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Corners of the box around the walls, `(3,)` each [m]; None without walls.
+
+    Of a plane, which has no end, the point that its MJCF names counts.
+    """
+    solid = walls(model)
+    box = box_around(model, solid)
+    planes = solid & (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
+    corners = [at_rest(model).geom_xpos[planes], *([] if box is None else [box])]
+    points = np.concatenate(corners)
+    return (points.min(axis=0), points.max(axis=0)) if len(points) else None
+
+
 def arena_box(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     """Corners of the box around the visible arena, `(3,)` each [m]."""
     box = box_around(model, drawn(model) & static(model))

@@ -1,7 +1,12 @@
-"""Compiling MJCF: an arena with its robot exchanged."""
+"""Compiling MJCF: a robot attached to an arena.
 
-import hashlib
-import xml.etree.ElementTree as ET
+The robot brings its physics: integrator, solver, step, gravity and flags are those of
+its file, and what an arena says about them is not used. The arena gives walls, floor
+and looks. The names of the robot's parts begin with PREFIX in a scene.
+"""
+
+import os
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,154 +15,126 @@ from pathlib import Path
 import mujoco
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.files import is_file, read_text
-from epuck_mj.scene.model_files import SHIPPED_ROBOTS
-from epuck_mj.scene.robot_parts import ROBOT_BODY, TIMESTEP
+from epuck_mj.scene.floor import lay_floor
+from epuck_mj.scene.robot_parts import OWN_BODY, PREFIX, index_of
+from epuck_mj.scene.sameness import check_same
+from epuck_mj.scene.source_files import SourceFiles, defines_robot, source_files
+from epuck_mj.scene.xml_elements import BadXml
 
-ADDED_ROBOT = "robot added to the arena.xml"
+WHOLE_MODEL = {
+    "settotalmass": -1,
+    "boundmass": 0,
+    "boundinertia": 0,
+    "balanceinertia": False,
+    "fusestatic": False,
+    "discardvisual": False,
+    "alignfree": False,
+}
+"""Settings of an arena's compiler that would change the robot, and what they are."""
 
 
-@dataclass(frozen=True)
-class SceneText:
-    """An arena with its robot exchanged, not yet compiled.
+@dataclass(frozen=True, eq=False)
+class Compiled:
+    """A robot in an arena.
 
     Attributes:
-        text: of the arena.
-        files: what it includes, by the name it includes it by.
-        paths: where each of these is from.
-        arena: where the text is from.
-        robot: where the robot is from, which one of the files is.
+        model: the compiled model.
+        spec: what it was compiled from.
+        sha256: of each file: `arena`, `robot`, and all others by path from the arena's
+            folder or the robot's.
+        arena: files of the arena.
+        floor: indices of geoms whose collision bits were changed to make them a floor.
     """
 
-    text: str
-    files: Mapping[str, bytes]
-    paths: Mapping[str, Path]
-    arena: Path
-    robot: Path
+    model: mujoco.MjModel
+    spec: mujoco.MjSpec
+    sha256: Mapping[str, str]
+    arena: SourceFiles
+    floor: tuple[int, ...]
 
 
-def compiled(arena: Path, robot: Path) -> tuple[mujoco.MjModel, dict[str, str]]:
-    """The model of a robot in an arena, and the SHA-256 of each of its files.
+def compiled(arena: Path, robot: Path) -> Compiled:
+    """A robot in an arena, compiled.
 
-    The hashes are called `arena`, `robot`, and by name for all other files.
+    A robot that the arena includes is left out.
 
     Raises:
-        UserError: if a file is missing, or MuJoCo cannot compile it.
+        UserError: if a file is missing, MuJoCo cannot compile it, the arena is a robot
+            itself, or it would change the robot.
     """
-    # compiled alone first: errors in an included file have no line number
-    with _complaints(robot):
-        mujoco.MjSpec.from_file(str(robot)).compile()
-    scene = with_robot(arena, robot)
-    with _complaints(arena):
-        spec = mujoco.MjSpec.from_string(scene.text, include=dict(scene.files))
-        assets = find_assets(spec, scene)
-        # a robot that brings its converged step wants no other from the arena
-        step = spec.numeric(TIMESTEP)
-        if step is not None:
-            spec.option.timestep = step.data[0]
-        model = spec.compile()
-    contents = {"arena": scene.text.encode()}
-    for name, content in scene.files.items():
-        contents["robot" if scene.paths[name] == robot else name] = content
-    contents |= {name: path.read_bytes() for name, path in assets.items()}
-    return model, {
-        name: hashlib.sha256(content).hexdigest() for name, content in contents.items()
-    }
-
-
-def with_robot(arena: Path, robot: Path) -> SceneText:
-    """The arena's text and the files it includes, the robot among them replaced.
-
-    Raises:
-        UserError: if a file is missing or no XML, includes what MuJoCo would not find,
-            or the arena is a robot itself.
-    """
-    text, robot_text = read_text(arena), _included(robot)
-    paths = {}
-    for name in _includes(text, arena):
-        path = arena.parent / name
-        # a copied arena may name a robot that it left behind
-        if path.name in SHIPPED_ROBOTS or _has_robot(read_text(path), path):
-            path = robot
-        paths[name] = path
-    if robot not in paths.values():
-        if _has_robot(text, arena):
-            raise UserError(
-                f"arena '{arena}' defines its own body '{ROBOT_BODY}': expected walls "
-                "only, or a robot by <include>"
-            )
-        # walls only: the robot goes last, so line numbers stay
-        paths[ADDED_ROBOT] = robot
-        head, _, tail = text.rpartition("</mujoco>")
-        text = f'{head}<include file="{ADDED_ROBOT}"/></mujoco>{tail}'
-    files = {
-        name: (robot_text if path == robot else _included(path)).encode()
-        for name, path in paths.items()
-    }
-    return SceneText(text, files, paths, arena, robot)
-
-
-def find_assets(spec: mujoco.MjSpec, scene: SceneText) -> dict[str, Path]:
-    """The files of meshes, textures and height fields by name, as far as they exist.
-
-    They are looked for beside the arena, then beside the robot; the spec is told where.
-    """
-    found = {}
-    spec.modelfiledir = str(scene.arena.parent)
-    # MuJoCo puts it before the names of files that the robot names
-    include = next(name for name, path in scene.paths.items() if path == scene.robot)
-    prefix = Path(include).parent
-    for parts, folder in (
-        (spec.meshes, spec.meshdir),
-        (spec.textures, spec.texturedir),
-        (spec.hfields, spec.meshdir),
-    ):
-        for part in parts:
-            name = Path(part.file)
-            own = name.relative_to(prefix) if name.is_relative_to(prefix) else name
-            places = (
-                scene.arena.parent / folder / name,
-                scene.robot.parent / folder / own,
-            )
-            path = next((path for path in places if part.file and is_file(path)), None)
-            if path is not None:
-                found[own.as_posix()] = path
-                part.file = str(path)
-    return found
-
-
-def _parse(text: str, path: Path) -> ET.Element:
-    try:
-        return ET.fromstring(text)
-    except ET.ParseError as error:
-        raise UserError(f"'{path}' is not well-formed XML: {error}") from None
-
-
-def _includes(text: str, path: Path) -> list[str]:
-    return [e.get("file", "") for e in _parse(text, path).iter("include")]
-
-
-def _included(path: Path) -> str:
-    """Text of an included file, which may include none: those would not be hashed."""
-    text = read_text(path)
-    inner = _includes(text, path)
-    if inner:
-        raise UserError(
-            f"'{path}' includes '{inner[0]}': an included file cannot include others, "
-            "nor can a robot; expected it in the arena"
+    robot_files, arena_files = (
+        source_files(robot, robots_stay=True),
+        source_files(arena),
+    )
+    own = defines_robot(arena_files.elements)
+    if own is not None:
+        raise BadXml.of(
+            own,
+            f"an arena cannot define a body '{OWN_BODY}' of its own: expected walls "
+            "only, or a robot by <include>",
         )
-    return text
+    with _complaints(robot):
+        alone = _spec(robot_files).compile()
+    index_of(alone, mujoco.mjtObj.mjOBJ_BODY, OWN_BODY, robot)
+    with _complaints(arena):
+        spec = _spec(arena_files)
+        _attach(spec, _spec(robot_files))
+        model, floor = lay_floor(spec)
+    if model.nflex:
+        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX.value, 0)
+        raise UserError(
+            f"arena '{arena}' has a flex, '{name}': expected walls that are geoms and "
+            "stand still"
+        )
+    check_same(model, alone, arena)
+    hashes = _hashes(robot_files, "robot") | _hashes(arena_files, "arena")
+    sha256 = {name: hashes.pop(name) for name in ("arena", "robot")} | hashes
+    for files in (arena_files, robot_files):
+        for element in files.missing:
+            raise BadXml.of(
+                element, "its file was not found, so a change in it would go unnoticed"
+            )
+    return Compiled(model, spec, sha256, arena_files, floor)
 
 
-def _has_robot(text: str, path: Path) -> bool:
-    return _parse(text, path).find(f".//body[@name='{ROBOT_BODY}']") is not None
+def _spec(files: SourceFiles) -> mujoco.MjSpec:
+    # from the texts that were hashed, not from the files again
+    return mujoco.MjSpec.from_file(
+        str(files.main), include={str(path): text for path, text in files.xml.items()}
+    )
+
+
+def _attach(arena: mujoco.MjSpec, robot: mujoco.MjSpec) -> None:
+    """Put a robot into an arena, and its physics in place of the arena's."""
+    for spec in (arena, robot):
+        # of other sizes than the scene
+        for key in list(spec.keys):
+            spec.delete(key)
+    arena.option = robot.option
+    # MuJoCo's own choice is a hundred times what one robot needs
+    arena.memory = robot.memory = -1 if arena.joints else robot.memory
+    arena.attach(robot, prefix=PREFIX, frame=arena.worldbody.add_frame())
+    for name, value in WHOLE_MODEL.items():
+        setattr(arena.compiler, name, value)
+
+
+def _hashes(files: SourceFiles, name: str) -> dict[str, str]:
+    return {
+        name
+        if path == files.main
+        else Path(os.path.relpath(path, files.main.parent)).as_posix(): digest
+        for path, digest in files.sha256().items()
+    }
 
 
 @contextmanager
 def _complaints(source: Path) -> Iterator[None]:
     """MuJoCo's errors about a file on one line."""
     try:
-        yield
-    except ValueError as error:
+        with warnings.catch_warnings():
+            # of attributes that will go; ours are not among them
+            warnings.simplefilter("ignore", UserWarning)
+            yield
+    except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
         message = " ".join(str(error).split())
         raise UserError(f"MuJoCo cannot compile '{source}': {message}") from None

@@ -2,7 +2,8 @@
 
 An arena is any MJCF with walls. It may include a robot, so that MuJoCo's viewer shows
 the whole scene; `load_scene` puts the robot asked for in that one's place. Robots
-differ in their base only, which the methods of `Scene` hide from other modules.
+differ in their base only, which the methods of `Scene` hide from other modules. The
+robot's physics is its own in every arena: see `mjcf`.
 """
 
 import hashlib
@@ -16,6 +17,7 @@ import mujoco
 import numpy as np
 
 from epuck_mj.errors import UserError
+from epuck_mj.scene.floor import check_contacts, check_floor
 from epuck_mj.scene.mjcf import compiled
 from epuck_mj.scene.model_files import find_arena, find_robot
 from epuck_mj.scene.robot_parts import (
@@ -24,7 +26,6 @@ from epuck_mj.scene.robot_parts import (
     SHELL,
     WHEELS,
     check_base,
-    check_floor,
     index_of,
     sensor_address,
 )
@@ -45,7 +46,8 @@ class Scene:
         wheels: indices of the wheels' actuators, left and right, `(2,)`.
         robot: path of the robot's MJCF.
         arena: path of the arena's MJCF.
-        sha256: of each file compiled: `arena`, `robot`, and all others by name.
+        sha256: of each file compiled: `arena`, `robot`, and all others by path.
+        floor: indices of geoms that were made a floor, whatever their bits were.
     """
 
     model: mujoco.MjModel
@@ -54,6 +56,7 @@ class Scene:
     robot: Path
     arena: Path
     sha256: Mapping[str, str]
+    floor: tuple[int, ...]
     _distance: np.ndarray
     _contact: int
 
@@ -136,9 +139,11 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
         UserError: if a file is missing or broken, or a part of the robot is.
     """
     robot_path, arena_path = find_robot(robot), find_arena(arena)
-    model, sha256 = compiled(arena_path, robot_path)
+    made = compiled(arena_path, robot_path)
+    model = made.model
     check_base(model, robot_path)
     index_of(model, _OBJECT.mjOBJ_GEOM, SHELL, robot_path)
+    check_contacts(model, arena_path)
     check_floor(model, arena_path)
     wheels = [
         index_of(model, _OBJECT.mjOBJ_ACTUATOR, name, robot_path) for name in WHEELS
@@ -150,7 +155,7 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
     contact = sensor_address(model, SHELL, _SENSOR.mjSENS_CONTACT, robot_path)
     if model.opt.timestep <= 0:
         raise UserError(
-            f"arena '{arena_path}': expected a physics step above 0 s, "
+            f"robot '{robot_path}': expected a physics step above 0 s, "
             f"got {model.opt.timestep:g} s"
         )
     ratio = control_step / model.opt.timestep
@@ -166,7 +171,8 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
         np.array(wheels),
         robot_path,
         arena_path,
-        sha256,
+        made.sha256,
+        made.floor,
         np.array(distance),
         contact,
     )

@@ -8,12 +8,16 @@ import numpy as np
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
 
-ROBOT_BODY = "epuck"
-SHELL = "shell"
-WHEELS = ("wheel_left", "wheel_right")
-PROXIMITY = tuple(f"ps{i}" for i in range(N_PROXIMITY))
-TIMESTEP = "timestep"
-"""Name of the number with which a robot's MJCF sets its physics step [s]."""
+PREFIX = "epuck/"
+"""What the names of the robot's parts begin with in a scene."""
+
+OWN_BODY = "epuck"
+"""Name of the robot's body in its own file."""
+
+ROBOT_BODY = f"{PREFIX}{OWN_BODY}"
+SHELL = f"{PREFIX}shell"
+WHEELS = (f"{PREFIX}wheel_left", f"{PREFIX}wheel_right")
+PROXIMITY = tuple(f"{PREFIX}ps{i}" for i in range(N_PROXIMITY))
 
 _JOINT, _SENSOR = mujoco.mjtJoint, mujoco.mjtSensor
 
@@ -35,34 +39,9 @@ def check_base(model: mujoco.MjModel, robot: Path) -> None:
     if types == planar and np.array_equal(axes, np.eye(3)) and at_origin:
         return
     raise UserError(
-        f"robot '{robot}': expected body '{ROBOT_BODY}' at the origin with a free "
+        f"robot '{robot}': expected body '{OWN_BODY}' at the origin with a free "
         "joint or with slides along x and y and a hinge about z"
     )
-
-
-def check_floor(model: mujoco.MjModel, arena: Path) -> None:
-    """Refuse a floor that the shell would hit, and wheels without a floor.
-
-    Raises:
-        UserError: if the arena has either.
-    """
-    shell, ground = model.geom(SHELL).id, static(model)
-    planes = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
-    for geom in np.flatnonzero(ground & planes & can_touch(model, shell)).tolist():
-        raise UserError(
-            f"arena '{arena}': the robot's shell would hit the plane "
-            f"'{model.geom(geom).name or geom}'; expected a floor with "
-            'contype="2" conaffinity="2", which wheels touch and shells do not'
-        )
-    base = model.body_jntadr[model.body(ROBOT_BODY).id]
-    if model.jnt_type[base] != _JOINT.mjJNT_FREE:
-        return
-    others = (geom for geom in np.flatnonzero(~ground).tolist() if geom != shell)
-    if not any((ground & can_touch(model, geom)).any() for geom in others):
-        raise UserError(
-            f"arena '{arena}' has no floor for the robot's wheels: expected a plane "
-            'with contype="2" conaffinity="2"'
-        )
 
 
 def static(model: mujoco.MjModel) -> np.ndarray:
@@ -85,7 +64,7 @@ def sensor_address(model: mujoco.MjModel, name: str, kind: int, robot: Path) -> 
     sensor = index_of(model, mujoco.mjtObj.mjOBJ_SENSOR, name, robot)
     if model.sensor_type[sensor] != kind:
         raise UserError(
-            f"robot '{robot}': expected sensor '{name}' to be a "
+            f"robot '{robot}': expected sensor '{name.removeprefix(PREFIX)}' to be a "
             f"{_SENSOR(kind).name.removeprefix('mjSENS_').lower()}"
         )
     return int(model.sensor_adr[sensor])
@@ -108,5 +87,9 @@ def index_of(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, robot: Path)
         "sensor": model.nsensor,
     }[label]
     names = [mujoco.mj_id2name(model, kind.value, i) or "" for i in range(count)]
-    available = ", ".join(filter(None, names)) or "none"
-    raise UserError(f"robot '{robot}' has no {label} '{name}'; available: {available}")
+    # a robot that was compiled alone has no prefix
+    own = [n.removeprefix(PREFIX) for n in names if n.startswith(PREFIX)] or names
+    raise UserError(
+        f"robot '{robot}' has no {label} '{name.removeprefix(PREFIX)}'; available: "
+        + (", ".join(filter(None, own)) or "none")
+    )

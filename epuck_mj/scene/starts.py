@@ -13,7 +13,7 @@ from mujoco.batch import Batch
 from scipy import ndimage
 
 from epuck_mj.errors import UserError
-from epuck_mj.scene.geometry import box_around, walls
+from epuck_mj.scene.geometry import box_around_walls
 from epuck_mj.scene.model import Scene, once_per_model
 from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL
 
@@ -23,6 +23,8 @@ NODES_MAX = 400
 SPACING_MIN = 0.01
 """Grid spacing [m], unless the arena is larger than NODES_MAX spacings."""
 
+SIZE_MAX = 35.0
+"""Longest side of an arena [m]: 500 times the robot's diameter."""
 
 BLOCK = 64
 """Number of candidates drawn at once; changing it changes all starts."""
@@ -78,13 +80,18 @@ def survey(scene: Scene, clearance: float) -> Grid:
     Raises:
         UserError: if no walls are there.
     """
-    box = box_around(scene.model, walls(scene.model))
+    box = box_around_walls(scene.model)
     if box is None:
         raise UserError(
             f"arena '{scene.arena}' has no walls: expected geoms fixed to the "
             "world that the robot's shell can hit"
         )
     lower, upper = box[0][:2], box[1][:2]
+    if not (upper - lower).max() < SIZE_MAX:
+        raise UserError(
+            f"arena '{scene.arena}' is {(upper - lower).max():g} m wide: expected less "
+            f"than {SIZE_MAX:g} m, 500 robots; are its lengths in millimetres?"
+        )
     # one shell's width of outside all around
     border = 2 * scene.model.geom(SHELL).rbound.item() + clearance
     size = upper - lower + 2 * border

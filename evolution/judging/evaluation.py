@@ -17,6 +17,7 @@ import numpy as np
 from epuck_mj.policies.topology import Topology
 from epuck_mj.rungs.disturbed import disturbed
 from epuck_mj.rungs.table import robots_in
+from epuck_mj.rungs.warnings import unstable
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.control import (
     BatchPolicy,
@@ -175,12 +176,17 @@ class DmControlEngine:
         """See `Engine.run`; every trial runs to its end, with an ideal robot.
 
         Raises:
+            UserError: if MuJoCo warns of a simulation that means nothing.
             ValueError: if there are disturbances.
         """
         if work.disturbances is not None:
             raise ValueError("expected no disturbances with engine dm_control")
         # dm_control for those who use it
-        from epuck_mj.environments.dm_control import FollowWalls, environment
+        from epuck_mj.environments.dm_control import (
+            FollowWalls,
+            PhysicsError,
+            environment,
+        )
 
         task = FollowWalls(self._scene, self._task, starts=work.starts)
         env, n = environment(self._scene, task), len(work)
@@ -190,7 +196,10 @@ class DmControlEngine:
             policy, time_step = started(work.controller[i : i + 1], 1), env.reset()
             while not time_step.last():
                 observation = time_step.observation["proximity"]
-                time_step = env.step(policy(observation[None])[0])
+                try:
+                    time_step = env.step(policy(observation[None])[0])
+                except PhysicsError as problem:
+                    raise unstable(self._scene, str(problem)) from None
                 fitness[i] += time_step.reward
                 steps[i] += 1
             crashed[i] = task.crashed(env.physics)

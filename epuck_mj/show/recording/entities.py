@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import rerun as rr
 
+from epuck_mj.scene.robot_parts import PREFIX
 from epuck_mj.show.colors import TRIALS
 from epuck_mj.trials.trajectory import Trajectory
 
@@ -59,8 +60,9 @@ class Entities:
         return f"{self.root}/signals/{name}"
 
     def body(self, name: str) -> str:
-        """Name of a moving body."""
-        return f"{self.root}/robot/{name}"
+        """Name of a moving body: of the robot's, or of a thing in the arena."""
+        own = name.removeprefix(PREFIX)
+        return f"{self.root}/{'robot' if own != name else 'things'}/{own}"
 
 
 def entities(names: Sequence[str]) -> list[Entities]:

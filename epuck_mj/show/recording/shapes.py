@@ -12,7 +12,7 @@ from epuck_mj.scene.geometry import (
     mesh,
     moving_bodies,
 )
-from epuck_mj.scene.robot_parts import ROBOT_BODY
+from epuck_mj.scene.robot_parts import PREFIX, ROBOT_BODY
 from epuck_mj.show.recording.entities import ARENA, Entities
 
 FLOOR_THICKNESS = 0.002
@@ -68,7 +68,7 @@ def _log(
     position: np.ndarray,
     quaternion: np.ndarray,
 ) -> None:
-    name = model.geom(geom).name or f"geom{geom}"
+    name = model.geom(geom).name.removeprefix(PREFIX) or f"geom{geom}"
     # MuJoCo says wxyz, rerun xyzw
     place = rr.Transform3D(
         translation=position, quaternion=quaternion[[1, 2, 3, 0]].tolist()

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import rerun as rr
 
-from epuck_mj.scene.robot_parts import PROXIMITY
+from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.show.colors import (
     BLUE,
     FAINT,
@@ -20,6 +20,8 @@ from epuck_mj.show.colors import (
 from epuck_mj.show.recording.entities import DECIDED, EARNED, SENSED, Entities, columns
 from epuck_mj.trials.phases import CORNERING, CRASHED, FOLLOWING, SEARCHING, phases
 from epuck_mj.trials.trajectory import Trajectory
+
+SENSORS = tuple(f"ps{i}" for i in range(N_PROXIMITY))
 
 RAINBOW = (GREY, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PURPLE)
 
@@ -53,8 +55,8 @@ def signals(trajectory: Trajectory, clearance: np.ndarray) -> dict[str, Signal]:
     hidden = tuple(f"h{i}" for i in range(trajectory.hidden.shape[1]))
     network = np.concatenate([trajectory.hidden, output], axis=1)
     all_signals = {
-        "observation": Signal(trajectory.observation, PROXIMITY, SENSED),
-        "proximity": Signal(trajectory.proximity, PROXIMITY, SENSED),
+        "observation": Signal(trajectory.observation, SENSORS, SENSED),
+        "proximity": Signal(trajectory.proximity, SENSORS, SENSED),
         "network": Signal(network, (*hidden, "v", "w"), DECIDED),
         "action": Signal(trajectory.action, ("v", "w"), DECIDED),
         "command": Signal(trajectory.command, ("left", "right"), DECIDED),

@@ -1,0 +1,55 @@
+"""Heights at which a robot can hit and see things, and those of a geom."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from epuck_mj.constants import PROXIMITY_RANGE
+from epuck_mj.scene.geometry import box_around, kinematics
+from epuck_mj.scene.model import Scene
+from epuck_mj.scene.robot_parts import SHELL
+
+
+@dataclass(frozen=True)
+class Heights:
+    """Heights in which a robot can hit and see [m]."""
+
+    shell: tuple[float, float]
+    rays: tuple[float, float]
+
+
+def heights_of(scene: Scene) -> Heights:
+    """Where shell and rays of a robot are, upright on a floor at 0."""
+    model = scene.model
+    shell = np.arange(model.ngeom) == model.geom(SHELL).id
+    box = box_around(model, shell)
+    assert box is not None, "the shell is no plane"
+    _, _, origin, direction = kinematics(scene, np.zeros((1, 3)))
+    ends = origin[..., 2], (origin + PROXIMITY_RANGE * direction)[..., 2]
+    low, high = np.min(ends), np.max(ends)
+    return Heights((box[0][2], box[1][2]), (float(low), float(high)))
+
+
+def extent(model: mujoco.MjModel, geom: int) -> tuple[float, float]:
+    """Lowest and highest point of a geom [m]; of a plane, no end."""
+    box = box_around(model, np.arange(model.ngeom) == geom)
+    if box is None:
+        return -np.inf, np.inf
+    return float(box[0][2]), float(box[1][2])
+
+
+def seen_by_rays(model: mujoco.MjModel) -> np.ndarray:
+    """Which geoms a rangefinder can hit, `(ngeom,)`; see `mj_ray`.
+
+    Rays meet geoms of any group and any collision bits. They pass through those of
+    alpha 0, where a material's alpha counts before the geom's own.
+    """
+    alpha, material = model.geom_rgba[:, 3].copy(), model.geom_matid
+    alpha[material >= 0] = model.mat_rgba[material[material >= 0], 3]
+    return alpha > 0
+
+
+def mm(height: float) -> str:
+    """A height as text."""
+    return f"{height * 1000:.1f} mm"

@@ -1,0 +1,238 @@
+"""Findings about what rays see where the robot can touch something.
+
+Robots are put to the outlines of things, headed straight at them. What counts is what
+the shell meets there and what rays see there, from whichever geom.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from scipy import ndimage
+
+from epuck_mj.check.findings import Finding, Place, error, warning
+from epuck_mj.check.heights import Heights, extent, mm, seen_by_rays
+from epuck_mj.constants import BODY_RADIUS, PROXIMITY_RANGE
+from epuck_mj.scene.clearance import ClearanceProbe
+from epuck_mj.scene.geometry import kinematics, walls
+from epuck_mj.scene.model import Scene
+from epuck_mj.scene.outline import geom_outlines
+from epuck_mj.scene.robot_parts import ROBOT_BODY, static
+from epuck_mj.scene.starts import Grid
+from epuck_mj.step.control import START_CLEARANCE
+
+TOPIC = "walls"
+
+STEP = 0.005
+"""Distance of the places on an outline that are tried [m]."""
+
+FINE_STEP = 0.0005
+"""The same on sides so short that rays may pass on both of their ends [m]."""
+
+SHORT = 0.04
+"""Length of such sides [m]."""
+
+PLACES_MAX = 50_000
+"""Most places that are tried in an arena."""
+
+TOUCH = 0.001
+"""Largest distance that counts as touching [m]."""
+
+DEPTH = 0.010
+"""How far behind the place that a shell touches rays may see the wall [m]."""
+
+FRONT = np.cos(np.radians(30))
+"""Least cosine of the angle between the heading and a ray that counts as ahead."""
+
+
+@dataclass(frozen=True, eq=False)
+class Meetings:
+    """Robots that touch the outlines of geoms, headed at them.
+
+    Attributes:
+        geom: whose outline it is, `(n,)`.
+        poses: x, y [m], yaw [rad], `(n, 3)`.
+        behind: how far behind the outline rays straight ahead hit something [m],
+            `(n,)`; infinite if nowhere.
+        ahead: least distance that the robot's own rays to the front measure [m],
+            `(n,)`; infinite if none hits anything.
+        room: clearance of the robot there [m], `(n,)`.
+    """
+
+    geom: np.ndarray
+    poses: np.ndarray
+    behind: np.ndarray
+    ahead: np.ndarray
+    room: np.ndarray
+
+
+def sight_findings(
+    scene: Scene, grid: Grid, places: tuple[Place, ...], heights: Heights
+) -> list[Finding]:
+    """Findings about walls that rays do not see, and seen things that are no walls."""
+    model = scene.model
+    solid = walls(model)
+    ghost = static(model) & ~solid & seen_by_rays(model)
+    ghost &= model.body_rootid[model.geom_bodyid] != model.body(ROBOT_BODY).id
+    met = _meetings(scene, grid, solid | ghost, sum(heights.rays) / 2)
+    touching = solid[met.geom] & (np.abs(met.room) <= TOUCH)
+    unseen = touching & (met.behind > PROXIMITY_RANGE)
+    deep = touching & ~unseen & (met.behind > DEPTH)
+    blind = touching & ~unseen & (met.ahead > PROXIMITY_RANGE)
+    through = ghost[met.geom] & (met.room > DEPTH) & (np.abs(met.behind) <= TOUCH)
+    findings = []
+    for geom in np.unique(met.geom).tolist():
+        of_geom, place = met.geom == geom, places[geom]
+        if (of_geom & unseen).any():
+            text = f"rays cannot see it: {_why(model, geom, heights)}"
+            text += _where(met.poses[of_geom & unseen])
+            findings.append(error(TOPIC, text, place))
+        elif (of_geom & deep).any():
+            depth = met.behind[of_geom & deep].max()
+            text = f"rays see a wall {mm(depth)} behind where the shell touches it"
+            text += _where(met.poses[of_geom & deep])
+            findings.append(warning(TOPIC, text, place))
+        elif (of_geom & blind).any():
+            text = "too thin for single rays: straight ahead, a robot sees nothing "
+            text += f"until it crashes{_where(met.poses[of_geom & blind])}"
+            findings.append(warning(TOPIC, text, place))
+        elif (of_geom & through).any():
+            bits = f'contype="{model.geom_contype[geom]}" '
+            bits += f'conaffinity="{model.geom_conaffinity[geom]}"'
+            text = f"rays see it, but the shell cannot hit it: {bits}; expected 1 of a "
+            findings.append(warning(TOPIC, text + "wall", place))
+    return findings
+
+
+def _why(model: mujoco.MjModel, geom: int, heights: Heights) -> str:
+    """Why rays do not see a geom that the shell touches."""
+    low, high = extent(model, geom)
+    if not seen_by_rays(model)[geom]:
+        material = model.geom_matid[geom]
+        of = f" of material '{model.material(material).name}'" if material >= 0 else ""
+        return f"alpha 0{of}"
+    if high < heights.rays[0]:
+        return f"it ends at {mm(high)}, rays run at {mm(heights.rays[0])}"
+    if low > heights.rays[1]:
+        return f"it begins at {mm(low)}, rays run at {mm(heights.rays[1])}"
+    return f"where the shell touches it, there is nothing within {mm(PROXIMITY_RANGE)}"
+
+
+def _where(poses: np.ndarray) -> str:
+    x, y, _ = poses[len(poses) // 2]
+    return f" (near x {x:.2f} m, y {y:.2f} m)"
+
+
+def _meetings(scene: Scene, grid: Grid, geoms: np.ndarray, height: float) -> Meetings:
+    """Meetings with the geoms of a mask, where the robot has room to stand."""
+    index, poses = _approaches(scene, grid, geoms)
+    probe = ClearanceProbe(scene, 1)
+    room = probe.measure(poses).distance
+    stands = room >= -TOUCH
+    index, poses, room = index[stands], poses[stands], room[stands]
+    heading = np.stack(
+        [np.cos(poses[:, 2]), np.sin(poses[:, 2]), np.zeros(len(poses))], axis=1
+    )
+    behind = _rays(scene, poses, heading, height) - BODY_RADIUS
+    # a ghost is met without being touched: is there room behind it?
+    ghosts = ~walls(scene.model)[index]
+    deeper = poses + np.where(ghosts, DEPTH, 0)[:, None] * heading * [1, 1, 0]
+    room = np.where(ghosts, probe.measure(deeper).distance + DEPTH, room)
+    return Meetings(index, poses, behind, _ahead(scene, poses), room)
+
+
+def _approaches(
+    scene: Scene, grid: Grid, geoms: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Indices `(n,)` of geoms and poses `(n, 3)` that touch their outlines."""
+    # a robot that touches is nearer to walls than it may start
+    reach = int(np.ceil(START_CLEARANCE / grid.spacing)) + 1
+    near = np.asarray(ndimage.binary_dilation(grid.inside, np.ones((3, 3)), reach))
+    found, numbers = [], []
+    outlines = geom_outlines(scene, geoms)
+    for geom, outline in zip(np.flatnonzero(geoms).tolist(), outlines, strict=True):
+        poses = np.concatenate(list(_around(outline)))
+        node = np.round((poses[:, :2] - grid.origin) / grid.spacing).astype(int)
+        # outside of the grid, it is its edge that counts
+        x, y = np.clip(node, 0, np.array(near.shape) - 1).T
+        there: np.ndarray = near[x, y]
+        found.append(poses[there])
+        numbers.append(np.full(there.sum(), geom))
+    index, poses = np.concatenate(numbers), np.concatenate(found)
+    stride = max(1, -(-len(poses) // PLACES_MAX))
+    return index[::stride], poses[::stride]
+
+
+def _around(outline: np.ndarray) -> Iterator[np.ndarray]:
+    """Poses `(n, 3)` that touch a convex outline `(points, 2)`, headed at it."""
+    angles = np.linspace(0, 2 * np.pi, len(outline), endpoint=False)
+    yield _headed(outline, angles)
+    for start, end in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        length = float(np.hypot(*(end - start)))
+        if length > TOUCH / 10:
+            n = 2 + int(length / (FINE_STEP if length < SHORT else STEP))
+            share = np.linspace(0, 1, n)[:, None]
+            along = np.arctan2(*(end - start)[::-1])
+            # counterclockwise: outside is on the right
+            yield _headed(start + share * (end - start), np.full(n, along - np.pi / 2))
+
+
+def _headed(points: np.ndarray, outward: np.ndarray) -> np.ndarray:
+    normal = np.stack([np.cos(outward), np.sin(outward)], axis=1)
+    yaw = np.arctan2(-normal[:, 1], -normal[:, 0])
+    return np.concatenate([points + BODY_RADIUS * normal, yaw[:, None]], axis=1)
+
+
+def _rays(
+    scene: Scene, poses: np.ndarray, heading: np.ndarray, height: float
+) -> np.ndarray:
+    """Distances [m] from poses `(n, 3)` straight ahead, `(n,)`; infinite: nothing.
+
+    The nearer of two rays side by side, since one may just pass a corner.
+    """
+    model, data = scene.model, mujoco.MjData(scene.model)
+    # the robot itself is out of the way
+    data.qpos[:] = scene.qpos(np.array([FAR, FAR, 0.0]))
+    mujoco.mj_kinematics(model, data)
+    geom = np.zeros(1, np.int32)
+    middle = np.concatenate([poses[:, :2], np.full((len(poses), 1), height)], axis=1)
+    left = BESIDE * np.cross([0, 0, 1], heading)
+    found = [
+        mujoco.mj_ray(model, data, origin, direction, None, 1, -1, geom)
+        for side in (-1, 1)
+        for origin, direction in zip(middle + side * left, heading, strict=True)
+    ]
+    distance = np.array(found).reshape(2, -1)
+    return np.where(distance < 0, np.inf, distance).min(axis=0)
+
+
+BESIDE = 0.0005
+"""Distance of these rays from the middle [m]."""
+
+
+FAR = 1000.0
+"""Where a robot is out of the way [m]."""
+
+
+def _ahead(scene: Scene, poses: np.ndarray) -> np.ndarray:
+    """Least distance that the rays to the front measure [m], `(n,)`."""
+    _, _, _, direction = kinematics(scene, np.zeros((1, 3)))
+    front = direction[0, :, 0] >= FRONT
+    ahead = np.full(len(poses), np.inf)
+    batch = Batch(scene.model, CHUNK, 1)
+    qpos, sensordata = batch.bind("qpos"), batch.bind("sensordata")
+    for first in range(0, len(poses), CHUNK):
+        some = poses[first : first + CHUNK]
+        ids = np.arange(len(some), dtype=np.int32)
+        qpos[ids] = scene.qpos(some)
+        batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)
+        distance = scene.reading(sensordata[ids]).distance[:, front]
+        seen = np.where(distance < 0, np.inf, distance).min(axis=1, initial=np.inf)
+        ahead[first : first + CHUNK] = seen
+    return ahead
+
+
+CHUNK = 1024
+"""Number of poses measured at once: bounds memory, changes no result."""
