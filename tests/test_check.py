@@ -280,8 +280,11 @@ WARNINGS = {
         f"my.xml:{MORE}: warning: <geom>: it moves, so it is no wall: touching it",
     ),
     "leaning wall": (
-        with_more('<geom type="box" size=".05 .2 .05" pos="0 0 .03" euler="0 -35 0"/>'),
-        f"my.xml:{MORE}: warning: <geom>: rays see a wall ",
+        east(
+            '<geom name="east" type="box" pos="0.36 0 0.05" size="0.01 0.32 0.12" '
+            'euler="0 30 0"/>'
+        ),
+        f'my.xml:{EAST}: warning: <geom name="east">: rays see a wall ',
     ),
     "post": (
         with_more('<geom name="post" type="cylinder" size=".012 .03" pos="0 0 .03"/>'),

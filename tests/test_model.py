@@ -301,7 +301,7 @@ def test_broken_arenas_are_refused(tmp_path):
     assert "gone.xml" in refusal(arena=path)
     inline = (MODELS / "epuck.xml").read_text()
     path.write_text(inline)
-    assert "defines its own body 'epuck'" in refusal(arena=path)
+    assert "line 44: an arena cannot define a body 'epuck'" in refusal(arena=path)
 
 
 def test_control_step_is_a_multiple_of_the_physics_step():

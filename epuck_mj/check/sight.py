@@ -40,6 +40,12 @@ PLACES_MAX = 50_000
 TOUCH = 0.001
 """Largest distance that counts as touching [m]."""
 
+ADVANCES = 3
+"""How often robots advance by their clearance until they touch what they head at."""
+
+FACING = np.cos(np.radians(10))
+"""Least cosine of the angle between the heading and what the robot touches."""
+
 DEPTH = 0.010
 """How far behind the place that a shell touches rays may see the wall [m]."""
 
@@ -58,14 +64,16 @@ class Meetings:
             `(n,)`; infinite if nowhere.
         ahead: least distance that the robot's own rays to the front measure [m],
             `(n,)`; infinite if none hits anything.
-        room: clearance of the robot there [m], `(n,)`.
+        touches: whether the shell touches a wall straight ahead, `(n,)`.
+        passes: whether nothing stops it, `(n,)`.
     """
 
     geom: np.ndarray
     poses: np.ndarray
     behind: np.ndarray
     ahead: np.ndarray
-    room: np.ndarray
+    touches: np.ndarray
+    passes: np.ndarray
 
 
 def sight_findings(
@@ -77,11 +85,10 @@ def sight_findings(
     ghost = static(model) & ~solid & seen_by_rays(model)
     ghost &= model.body_rootid[model.geom_bodyid] != model.body(ROBOT_BODY).id
     met = _meetings(scene, grid, solid | ghost, sum(heights.rays) / 2)
-    touching = solid[met.geom] & (np.abs(met.room) <= TOUCH)
-    unseen = touching & (met.behind > PROXIMITY_RANGE)
-    deep = touching & ~unseen & (met.behind > DEPTH)
-    blind = touching & ~unseen & (met.ahead > PROXIMITY_RANGE)
-    through = ghost[met.geom] & (met.room > DEPTH) & (np.abs(met.behind) <= TOUCH)
+    unseen = met.touches & (met.behind > PROXIMITY_RANGE)
+    deep = met.touches & ~unseen & (met.behind > DEPTH)
+    blind = met.touches & ~unseen & (met.ahead > PROXIMITY_RANGE)
+    through = met.passes & (np.abs(met.behind) <= TOUCH)
     findings = []
     for geom in np.unique(met.geom).tolist():
         of_geom, place = met.geom == geom, places[geom]
@@ -129,18 +136,31 @@ def _meetings(scene: Scene, grid: Grid, geoms: np.ndarray, height: float) -> Mee
     """Meetings with the geoms of a mask, where the robot has room to stand."""
     index, poses = _approaches(scene, grid, geoms)
     probe = ClearanceProbe(scene, 1)
-    room = probe.measure(poses).distance
-    stands = room >= -TOUCH
-    index, poses, room = index[stands], poses[stands], room[stands]
+    stands = probe.measure(poses).distance >= -TOUCH
+    index, poses = index[stands], poses[stands]
     heading = np.stack(
         [np.cos(poses[:, 2]), np.sin(poses[:, 2]), np.zeros(len(poses))], axis=1
     )
+    solid = walls(scene.model)[index]
+    for _ in range(ADVANCES):
+        # what leans is met behind its outline
+        met = probe.measure(poses)
+        facing = np.cos(met.direction - poses[:, 2]) >= FACING
+        way = np.where(solid & facing, met.distance, 0)
+        poses = poses + way[:, None] * heading * [1, 1, 0]
+    met = probe.measure(poses)
+    touches = np.abs(met.distance) <= TOUCH
+    touches &= np.cos(met.direction - poses[:, 2]) >= FACING
     behind = _rays(scene, poses, heading, height) - BODY_RADIUS
-    # a ghost is met without being touched: is there room behind it?
-    ghosts = ~walls(scene.model)[index]
-    deeper = poses + np.where(ghosts, DEPTH, 0)[:, None] * heading * [1, 1, 0]
-    room = np.where(ghosts, probe.measure(deeper).distance + DEPTH, room)
-    return Meetings(index, poses, behind, _ahead(scene, poses), room)
+    deeper = probe.measure(poses + DEPTH * heading * [1, 1, 0]).distance
+    return Meetings(
+        index,
+        poses,
+        behind,
+        _ahead(scene, poses),
+        solid & touches,
+        ~solid & (deeper > 0),
+    )
 
 
 def _approaches(
@@ -190,7 +210,7 @@ def _rays(
 ) -> np.ndarray:
     """Distances [m] from poses `(n, 3)` straight ahead, `(n,)`; infinite: nothing.
 
-    The nearer of two rays side by side, since one may just pass a corner.
+    The least of rays side by side, since one may just pass a corner.
     """
     model, data = scene.model, mujoco.MjData(scene.model)
     # the robot itself is out of the way
@@ -198,18 +218,18 @@ def _rays(
     mujoco.mj_kinematics(model, data)
     geom = np.zeros(1, np.int32)
     middle = np.concatenate([poses[:, :2], np.full((len(poses), 1), height)], axis=1)
-    left = BESIDE * np.cross([0, 0, 1], heading)
+    left = np.cross([0, 0, 1], heading)
     found = [
         mujoco.mj_ray(model, data, origin, direction, None, 1, -1, geom)
-        for side in (-1, 1)
+        for side in SIDES
         for origin, direction in zip(middle + side * left, heading, strict=True)
     ]
-    distance = np.array(found).reshape(2, -1)
+    distance = np.array(found).reshape(len(SIDES), -1)
     return np.where(distance < 0, np.inf, distance).min(axis=0)
 
 
-BESIDE = 0.0005
-"""Distance of these rays from the middle [m]."""
+SIDES = (-0.01, -0.0005, 0.0005, 0.01)
+"""Distances of these rays to the left of the middle [m]."""
 
 
 FAR = 1000.0
