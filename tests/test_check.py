@@ -14,8 +14,8 @@ from epuck_mj.check import picture, report
 from epuck_mj.check.__main__ import check as check_command
 from epuck_mj.check.arena import check_arena
 from epuck_mj.check.findings import Severity
-from epuck_mj.check.heights import seen_by_rays
 from epuck_mj.errors import UserError
+from epuck_mj.scene.geometry import seen_by_rays
 from epuck_mj.scene.model_files import MODELS
 from tests.processes import PATIENCE
 

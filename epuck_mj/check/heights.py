@@ -39,17 +39,6 @@ def extent(model: mujoco.MjModel, geom: int) -> tuple[float, float]:
     return float(box[0][2]), float(box[1][2])
 
 
-def seen_by_rays(model: mujoco.MjModel) -> np.ndarray:
-    """Which geoms a rangefinder can hit, `(ngeom,)`; see `mj_ray`.
-
-    Rays meet geoms of any group and any collision bits. They pass through those of
-    alpha 0, where a material's alpha counts before the geom's own.
-    """
-    alpha, material = model.geom_rgba[:, 3].copy(), model.geom_matid
-    alpha[material >= 0] = model.mat_rgba[material[material >= 0], 3]
-    return alpha > 0
-
-
 def mm(height: float) -> str:
     """A height as text."""
     return f"{height * 1000:.1f} mm"

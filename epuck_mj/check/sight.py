@@ -13,10 +13,10 @@ from mujoco.batch import Batch
 from scipy import ndimage
 
 from epuck_mj.check.findings import Finding, Place, error, warning
-from epuck_mj.check.heights import Heights, extent, mm, seen_by_rays
+from epuck_mj.check.heights import Heights, extent, mm
 from epuck_mj.constants import BODY_RADIUS, PROXIMITY_RANGE
 from epuck_mj.scene.clearance import ClearanceProbe
-from epuck_mj.scene.geometry import kinematics, walls
+from epuck_mj.scene.geometry import kinematics, seen_by_rays, walls
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.outline import geom_outlines
 from epuck_mj.scene.robot_parts import ROBOT_BODY, static

@@ -7,9 +7,9 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from epuck_mj.check.findings import Finding, Place, error, info, warning
-from epuck_mj.check.heights import Heights, extent, mm, seen_by_rays
+from epuck_mj.check.heights import Heights, extent, mm
 from epuck_mj.scene.clearance import MEASURED
-from epuck_mj.scene.geometry import at_rest, box_around_walls, mesh, walls
+from epuck_mj.scene.geometry import at_rest, box_around_walls, mesh, seen_by_rays, walls
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.outline import geom_outlines, within
 from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL, can_touch, static

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from epuck_mj.constants import N_PROXIMITY
+from epuck_mj.step.elementary import half_tanh
 
 N_ACTIONS = 2
 
@@ -106,14 +107,14 @@ class Controller:
 
         Source: paper, section 4. w is 2 sigmoid - 1, so that 0 drives straight on.
         """
-        action = _half_tanh(_layer(self.activation(observation), self.output))
+        action = half_tanh(_layer(self.activation(observation), self.output))
         action[..., 0] += 1.0
         action[..., 0] *= 0.5
         return action
 
     def activation(self, observation: np.ndarray) -> np.ndarray:
         """Output of the hidden neurons, `(..., hidden)` in [0, 1]."""
-        hidden = _half_tanh(_layer(observation, self.hidden))
+        hidden = half_tanh(_layer(observation, self.hidden))
         hidden += 1.0
         hidden *= 0.5
         return hidden
@@ -131,9 +132,3 @@ def _layer(inputs: np.ndarray, weights: np.ndarray) -> np.ndarray:
     if len(weights) > inputs.shape[-1]:
         total += weights[-1]
     return total
-
-
-def _half_tanh(x: np.ndarray) -> np.ndarray:
-    """tanh(x / 2) = 2 sigmoid(x) - 1, in place: never overflows."""
-    x *= 0.5
-    return np.tanh(x, out=x)

@@ -10,7 +10,7 @@ from epuck_mj.rungs.simulator import Simulator
 from epuck_mj.step.control import Robots
 from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.step.motors import actual_rates, step_rates, wheel_speeds
-from epuck_mj.step.sensors import Reading, counted, sensed_distance
+from epuck_mj.step.sensors import PROXIMITY_REACH, Reading, counted, sensed_distance
 
 
 def disturbed(
@@ -65,6 +65,7 @@ class DisturbedRobots:
         self._robots.embody(given.mass[given.of], given.friction[given.of])
         reading = self._robots.reset(starts)
         self._before = reading.distance
+        self._before = np.where(self._before > PROXIMITY_REACH, -1.0, self._before)
         return self._sensed(reading)
 
     def step(self, command: np.ndarray) -> Reading:
@@ -98,11 +99,13 @@ class DisturbedRobots:
     def _sensed(self, reading: Reading) -> Reading:
         """The disturbed reading, with the true distances."""
         given, of = self._disturbances, self._of
-        truth, before = reading.distance, self._before
+        # beyond their reach, sensors see nothing
+        seen = np.where(reading.distance > PROXIMITY_REACH, -1.0, reading.distance)
+        truth, before = seen, self._before
         self._before = truth
         # of what is seen twice, readings are between the two
         aged = truth + (before - truth) * self._share[of]
         aged = np.where((truth < 0) | (before < 0), truth, aged)
         counts = counted(aged, given.gains[of], given.count_noise[of, self._k])
         distance = sensed_distance(counts, given.known_gains[of])
-        return Reading(distance, reading.contact, counts, truth)
+        return Reading(distance, reading.contact, counts, reading.distance)

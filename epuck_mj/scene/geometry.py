@@ -34,6 +34,17 @@ def walls(model: mujoco.MjModel) -> np.ndarray:
     return can_touch(model, model.geom(SHELL).id) & static(model)
 
 
+def seen_by_rays(model: mujoco.MjModel) -> np.ndarray:
+    """Which geoms a rangefinder can hit, `(ngeom,)`; see `mj_ray`.
+
+    Rays meet geoms of any group and any collision bits. They pass through those of
+    alpha 0, where a material's alpha counts before the geom's own.
+    """
+    alpha, material = model.geom_rgba[:, 3].copy(), model.geom_matid
+    alpha[material >= 0] = model.mat_rgba[material[material >= 0], 3]
+    return alpha > 0
+
+
 def moving_bodies(model: mujoco.MjModel) -> list[int]:
     """Bodies that are not welded to the world."""
     return np.flatnonzero(model.body_weldid != 0).tolist()

@@ -12,11 +12,15 @@ from epuck_mj.constants import (
     PROXIMITY_COUNT_NOISE,
     PROXIMITY_COUNTS,
 )
+from epuck_mj.step.elementary import exp, interpolate, log
 
-_DISTANCES = np.array(list(PROXIMITY_COUNTS))
-_LOG_COUNTS = np.log(list(PROXIMITY_COUNTS.values()))
-_NOISE_DISTANCES = np.array(list(PROXIMITY_COUNT_NOISE))
-_NOISE = np.array(list(PROXIMITY_COUNT_NOISE.values()))
+PROXIMITY_DISTANCES = np.array(list(PROXIMITY_COUNTS))
+LOG_COUNTS = log(np.array(list(PROXIMITY_COUNTS.values())))
+NOISE_DISTANCES = np.array(list(PROXIMITY_COUNT_NOISE))
+NOISE = np.array(list(PROXIMITY_COUNT_NOISE.values()))
+
+PROXIMITY_REACH = float(PROXIMITY_DISTANCES[-1])
+"""Farthest distance at which counts were measured [m]: beyond, sensors see nothing."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +55,9 @@ def proximity(distance: np.ndarray, gains: np.ndarray | float = 1.0) -> np.ndarr
 
     Source: `PROXIMITY_COUNTS`, its logarithm linear in between.
     """
-    counts = np.exp(np.interp(distance, _DISTANCES, _LOG_COUNTS)) * gains
-    seen = (distance >= 0) & (distance <= _DISTANCES[-1])
+    logs = interpolate(distance, PROXIMITY_DISTANCES, LOG_COUNTS)
+    counts = exp(logs) * gains
+    seen = (distance >= 0) & (distance <= PROXIMITY_REACH)
     return np.where(seen, np.minimum(counts, PROXIMITY_COUNT_MAX), 0.0)
 
 
@@ -68,8 +73,8 @@ def counted(
 
     Source: `PROXIMITY_COUNT_NOISE`, linear in between.
     """
-    far = np.where(distance < 0, _NOISE_DISTANCES[-1], distance)
-    deviation = np.interp(far, _NOISE_DISTANCES, _NOISE)
+    far = np.where(distance < 0, NOISE_DISTANCES[-1], distance)
+    deviation = interpolate(far, NOISE_DISTANCES, NOISE)
     counts = np.rint(proximity(distance, gains) + noise * deviation)
     return np.clip(counts, 0, PROXIMITY_COUNT_MAX)
 
@@ -83,8 +88,8 @@ def sensed_distance(counts: np.ndarray, gains: np.ndarray | float = 1.0) -> np.n
         counts: of each sensor, `(..., 8)`.
         gains: of each sensor against the mean one, `(..., 8)`.
     """
-    logs = np.log(np.maximum(counts, 1.0) / gains)
-    return np.interp(logs, _LOG_COUNTS[::-1], _DISTANCES[::-1])
+    logs = log(np.maximum(counts, 1.0) / gains)
+    return interpolate(logs, LOG_COUNTS[::-1], PROXIMITY_DISTANCES[::-1])
 
 
 def observe(distance: np.ndarray, sensor_range: float) -> np.ndarray:

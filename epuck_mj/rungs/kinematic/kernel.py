@@ -1,0 +1,325 @@
+"""Compiled motion and rays of robots in a plan.
+
+Wheels roll without slipping. Their speeds follow commands with a first-order lag, whose
+distances and angles over a substep are exact; the path within one is the chord of a
+circle. No function of the system's mathematical library is called, so that every
+processor gives the same bits.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from epuck_mj.rungs.kinematic.compiling import compiled
+from epuck_mj.rungs.kinematic.plan import Body, Grid, Plan
+from epuck_mj.step.elementary import (
+    EXP_MAX,
+    N_TABLE,
+    NEAREST,
+    PER_LN2,
+    POWERS,
+    ROOTS,
+    STEP_HIGH,
+    STEP_LOW,
+    TABLE_BITS,
+)
+
+# columns of a robot's state
+X, Y, YAW, COS, SIN, AHEAD, AROUND, N_STATE = range(8)
+
+
+@compiled(forceinline=True)
+def exp(x):
+    """See `elementary.exp`."""
+    x = min(max(x, -EXP_MAX), EXP_MAX)
+    k = (x * PER_LN2 + NEAREST) - NEAREST
+    r = (x - k * STEP_HIGH) - k * STEP_LOW
+    square = r * r
+    high = 1 / 6 + r * (1 / 24 + r * (1 / 120))
+    series = r + square * (0.5 + r * high)
+    whole = np.int64(k)
+    root = ROOTS[whole & (N_TABLE - 1)]
+    return (root + root * series) * POWERS[(whole >> TABLE_BITS) + 1022]
+
+
+@compiled(forceinline=True)
+def half_tanh(x):
+    """See `elementary.half_tanh`."""
+    return 1.0 - 2.0 / (exp(x) + 1.0)
+
+
+@compiled(forceinline=True)
+def cell_of(grid: Grid, x, y):
+    """Index of the cell of a place; the last one if it is outside of the grid."""
+    i = np.int64(np.floor((x - grid.x) / grid.cell))
+    j = np.int64(np.floor((y - grid.y) / grid.cell))
+    if i < 0 or j < 0 or i >= grid.n_x or j >= grid.n_y:
+        return grid.n_x * grid.n_y
+    return i * grid.n_y + j
+
+
+@compiled(forceinline=True)
+def side_distance(sides, i, x, y):
+    """Square of the distance of a place from a side [m^2]."""
+    dx, dy = x - sides[i, 0], y - sides[i, 1]
+    ex, ey = sides[i, 2], sides[i, 3]
+    # of a side without length, 0 / 0 becomes its end
+    share = (dx * ex + dy * ey) / (ex * ex + ey * ey)
+    share = share if share > 0.0 else 0.0
+    share = share if share < 1.0 else 1.0
+    dx -= share * ex
+    dy -= share * ey
+    return dx * dx + dy * dy
+
+
+@compiled()
+def ellipse_distance(ellipses, i, x, y):
+    """Square of the distance of a place from an ellipse [m^2]; 0 inside.
+
+    The nearest point is (a^2 u / (t + a^2), b^2 v / (t + b^2)), where t is the largest
+    root of a falling function, found by halving.
+
+    Source: Eberly, Distance from a Point to an Ellipse (2013).
+    """
+    dx, dy = x - ellipses[i, 0], y - ellipses[i, 1]
+    a, b = ellipses[i, 4], ellipses[i, 5]
+    if a == b:
+        off = max(sqrt(dx * dx + dy * dy) - a, 0.0)
+        return off * off
+    # in the frame and the first quarter of the ellipse
+    u = abs(dx * ellipses[i, 2] + dy * ellipses[i, 3])
+    v = abs(dy * ellipses[i, 2] - dx * ellipses[i, 3])
+    if u * u / (a * a) + v * v / (b * b) <= 1.0:
+        return 0.0
+    low, high = 0.0, sqrt(u * u + v * v) * max(a, b)
+    for _ in range(100):
+        t = 0.5 * (low + high)
+        p, q = a * u / (t + a * a), b * v / (t + b * b)
+        if p * p + q * q > 1.0:
+            low = t
+        else:
+            high = t
+    t = 0.5 * (low + high)
+    du, dv = u - a * a * u / (t + a * a), v - b * b * v / (t + b * b)
+    return du * du + dv * dv
+
+
+@compiled(forceinline=True)
+def distance_to(first, near, sides, ellipses, cell, x, y):
+    """Distance of a place from the outlines near its cell [m]; infinite without any."""
+    least, n = np.inf, sides.shape[0]
+    for k in range(first[cell], first[cell + 1]):
+        i = near[k]
+        if i < n:
+            square = side_distance(sides, i, x, y)
+        else:
+            square = ellipse_distance(ellipses, i - n, x, y)
+        least = square if square < least else least
+    return sqrt(least)
+
+
+@compiled(forceinline=True)
+def cast_at_side(rays, sides, i, x, y, cos, sin, length):
+    """Shorten the rays `(n,)` of a robot that meet a side [m]."""
+    # the side in the robot's frame
+    dx, dy = sides[i, 0] - x, sides[i, 1] - y
+    ax, ay = cos * dx + sin * dy, cos * dy - sin * dx
+    dx, dy = sides[i, 2], sides[i, 3]
+    ex, ey = cos * dx + sin * dy, cos * dy - sin * dx
+    for k in range(length.shape[0]):
+        ox, oy, ux, uy = rays[0, k], rays[1, k], rays[2, k], rays[3, k]
+        px, py = ax - ox, ay - oy
+        # parallel ones divide by 0, and no comparison holds
+        inverse = 1.0 / (ux * ey - uy * ex)
+        t = (px * ey - py * ex) * inverse
+        share = (px * uy - py * ux) * inverse
+        meets = (t >= 0.0) & (t < length[k]) & (share >= 0.0) & (share <= 1.0)
+        length[k] = t if meets else length[k]
+
+
+@compiled()
+def cast_at_ellipse(rays, ellipses, i, x, y, cos, sin, length):
+    """Shorten the rays `(n,)` of a robot that meet an ellipse [m]."""
+    dx, dy = x - ellipses[i, 0], y - ellipses[i, 1]
+    fx, fy = ellipses[i, 2], ellipses[i, 3]
+    for k in range(length.shape[0]):
+        ox = dx + cos * rays[0, k] - sin * rays[1, k]
+        oy = dy + sin * rays[0, k] + cos * rays[1, k]
+        ux = cos * rays[2, k] - sin * rays[3, k]
+        uy = sin * rays[2, k] + cos * rays[3, k]
+        # in units of the half axes
+        px, py = (
+            (ox * fx + oy * fy) / ellipses[i, 4],
+            (oy * fx - ox * fy) / ellipses[i, 5],
+        )
+        vx, vy = (
+            (ux * fx + uy * fy) / ellipses[i, 4],
+            (uy * fx - ux * fy) / ellipses[i, 5],
+        )
+        a = vx * vx + vy * vy
+        b = px * vx + py * vy
+        square = b * b - a * (px * px + py * py - 1.0)
+        if square < 0.0:
+            continue
+        root = sqrt(square)
+        t = (-b - root) / a
+        t = t if t >= 0.0 else (-b + root) / a
+        if 0.0 <= t < length[k]:
+            length[k] = t
+
+
+@compiled(forceinline=True)
+def sense(
+    rays, shell, reach, grid: Grid, first, near, sides, ellipses, x, y, cos, sin, length
+):
+    """Lengths of a robot's rays `(n,)` [m]; -1 where nothing is within reach."""
+    n, far = sides.shape[0], shell + reach
+    for k in range(length.shape[0]):
+        length[k] = np.inf
+    cell = cell_of(grid, x, y)
+    for m in range(first[cell], first[cell + 1]):
+        i = near[m]
+        if i >= n:
+            cast_at_ellipse(rays, ellipses, i - n, x, y, cos, sin, length)
+        elif side_distance(sides, i, x, y) <= far * far:
+            cast_at_side(rays, sides, i, x, y, cos, sin, length)
+    for k in range(length.shape[0]):
+        length[k] = -1.0 if length[k] > reach else length[k]
+
+
+@compiled(forceinline=True)
+def move(
+    body: Body,
+    grid: Grid,
+    first,
+    near,
+    sides,
+    ellipses,
+    state,
+    i,
+    lags,
+    left,
+    right,
+    n_substeps,
+    substep,
+):
+    """Move robot `i` for a control step; whether its shell touched a wall.
+
+    Args:
+        body: numbers of the robot.
+        grid: of what its shell can touch; see `Walls`.
+        first: likewise.
+        near: likewise.
+        sides: likewise.
+        ellipses: likewise.
+        state: of all robots, `(n, N_STATE)`; changed.
+        i: number of the robot.
+        lags: of all robots, `(n, 4)`: the share of the speeds' difference to the
+            command that is left after a substep, and its time [s] that counts for the
+            way in it; ahead, then around.
+        left: commanded speed of the left wheel [rad/s].
+        right: of the right wheel.
+        n_substeps: number of substeps.
+        substep: duration of one [s].
+    """
+    ahead, around = 0.5 * (left + right), 0.5 * (right - left)
+    turn = 2.0 * body.wheel_radius / body.track
+    x, y, cos, sin = state[i, X], state[i, Y], state[i, COS], state[i, SIN]
+    u, w, yaw = state[i, AHEAD], state[i, AROUND], state[i, YAW]
+    left_ahead, time_ahead = lags[i, 0], lags[i, 1]
+    left_around, time_around = lags[i, 2], lags[i, 3]
+    cell, touched = cell_of(grid, x, y), False
+    # how far it can go before it may touch anything
+    free = distance_to(first, near, sides, ellipses, cell, x, y) - body.shell
+    for _ in range(n_substeps):
+        way = body.wheel_radius * (ahead * substep + (u - ahead) * time_ahead)
+        angle = turn * (around * substep + (w - around) * time_around)
+        u = ahead + (u - ahead) * left_ahead
+        w = around + (w - around) * left_around
+        # half of the turn, the chord, the other half
+        half = 0.5 * angle
+        z = half * half
+        sinc = 1.0 - z * (1 / 6 - z * (1 / 120 - z * (1 / 5040)))
+        c = 1.0 - z * (0.5 - z * (1 / 24 - z * (1 / 720 - z * (1 / 40320))))
+        s = half * sinc
+        cos, sin = cos * c - sin * s, sin * c + cos * s
+        x += way * sinc * cos
+        y += way * sinc * sin
+        cos, sin = cos * c - sin * s, sin * c + cos * s
+        yaw += angle
+        free -= abs(way)
+        if free <= ROUNDING:
+            free = distance_to(first, near, sides, ellipses, cell, x, y) - body.shell
+            if free <= 0.0:
+                touched = True
+                break
+    scale = 1.0 / sqrt(cos * cos + sin * sin)
+    state[i, X], state[i, Y], state[i, YAW] = x, y, yaw
+    state[i, COS], state[i, SIN] = cos * scale, sin * scale
+    state[i, AHEAD], state[i, AROUND] = u, w
+    return touched
+
+
+ROUNDING = 1e-12
+"""Distance that may be lost by rounding [m]."""
+
+
+@compiled()
+def step_all(
+    plan: Plan, states, lags, commands, n_substeps, substep, reach, distance, contact
+):
+    """One control step of robots `(n, N_STATE)`; fills `(n, 8)` and `(n,)`."""
+    grid, first, near, sides, ellipses = plan.solid
+    for i in range(states.shape[0]):
+        contact[i] = move(
+            plan.body,
+            grid,
+            first,
+            near,
+            sides,
+            ellipses,
+            states,
+            i,
+            lags,
+            commands[i, 0],
+            commands[i, 1],
+            n_substeps,
+            substep,
+        )
+    sense_all(plan, states, reach, distance)
+
+
+@compiled()
+def touch_all(plan: Plan, states, contact):
+    """Whether robots `(n, N_STATE)` touch a wall where they stand; fills `(n,)`."""
+    grid, first, near, sides, ellipses = plan.solid
+    for i in range(states.shape[0]):
+        x, y = states[i, X], states[i, Y]
+        cell = cell_of(grid, x, y)
+        far = distance_to(first, near, sides, ellipses, cell, x, y)
+        contact[i] = far <= plan.body.shell
+
+
+@compiled()
+def sense_all(plan: Plan, states, reach, distance):
+    """What robots `(n, N_STATE)` sense where they stand; fills `(n, 8)`."""
+    grid, first, near, sides, ellipses = plan.seen
+    rays, length = plan.rays, np.empty(plan.rays.shape[1])
+    for i in range(states.shape[0]):
+        sense(
+            rays,
+            plan.body.shell,
+            reach,
+            grid,
+            first,
+            near,
+            sides,
+            ellipses,
+            states[i, X],
+            states[i, Y],
+            states[i, COS],
+            states[i, SIN],
+            length,
+        )
+        for k in range(length.shape[0]):
+            distance[i, k] = length[k]
