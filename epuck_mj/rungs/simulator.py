@@ -4,7 +4,9 @@ from typing import Protocol
 
 import numpy as np
 
-from epuck_mj.step.control import Robots
+from epuck_mj.policies.network import Controller
+from epuck_mj.step.control import Robots, Trials
+from epuck_mj.step.disturbances import Disturbances
 
 
 class Simulator(Robots, Protocol):
@@ -25,4 +27,28 @@ class Simulator(Robots, Protocol):
 
     def disembody(self) -> None:
         """Give the robots the scene's body back, from the next reset on."""
+        ...
+
+
+class CompiledTrials(Protocol):
+    """Whole trials in compiled code, as `rungs.table.compiled_trials` makes them."""
+
+    def __call__(
+        self,
+        controller: Controller,
+        starts: np.ndarray,
+        disturbances: Disturbances | None,
+        per_individual: int,
+        to_beat: np.ndarray,
+    ) -> Trials:
+        """Trials `(n,)`.
+
+        Args:
+            controller: one per trial.
+            starts: poses `(n, 3)`: x, y [m], yaw [rad].
+            disturbances: of the trials; None for ideal robots.
+            per_individual: trials of each individual, which follow one another.
+            to_beat: sum of its fitness below which an individual may be broken off,
+                `(n / per_individual,)`; -inf where it may not.
+        """
         ...

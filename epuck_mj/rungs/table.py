@@ -7,10 +7,21 @@ a `Simulator` and a line in `RUNGS`.
 from collections.abc import Callable, Mapping
 
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
-from epuck_mj.rungs.simulator import Simulator
+from epuck_mj.rungs.simulator import CompiledTrials, Simulator
 from epuck_mj.scene.model import Scene
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT
+from epuck_mj.step.control import TaskParameters
+
+
+def _kinematic(scene: Scene, capacity: int, threads: int) -> Simulator:
+    # numba for those who use it
+    from epuck_mj.rungs.kinematic.robots import KinematicRobots
+
+    return KinematicRobots(scene, capacity, threads)
+
 
 RUNGS: Mapping[str, Callable[[Scene, int, int], Simulator]] = {
+    KINEMATIC_ROBOT: _kinematic,
     "epuck": MujocoRobots,
     "epuck_planar": MujocoRobots,
 }
@@ -25,4 +36,18 @@ def robots_in(scene: Scene, capacity: int, threads: int = 0) -> Simulator:
         capacity: the most robots that a reset can place.
         threads: threads that step them; 0 is one per core.
     """
-    return RUNGS.get(scene.robot.stem, MujocoRobots)(scene, capacity, threads)
+    return RUNGS.get(scene.name, MujocoRobots)(scene, capacity, threads)
+
+
+def compiled_trials(
+    scene: Scene, task: TaskParameters, threads: int = 0
+) -> CompiledTrials | None:
+    """Whole trials of the paper's network in compiled code, with the same bits.
+
+    None where there are none: on other rungs, and for a user's own step fitness.
+    """
+    if scene.name != KINEMATIC_ROBOT:
+        return None
+    from epuck_mj.rungs.kinematic.fused import FITNESS, FusedTrials
+
+    return FusedTrials(scene, task, threads) if task.fitness in FITNESS else None

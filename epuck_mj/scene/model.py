@@ -44,6 +44,7 @@ class Scene:
         model: the compiled model.
         n_substeps: physics steps in a control step.
         wheels: indices of the wheels' actuators, left and right, `(2,)`.
+        name: of the robot, which says how it is simulated; see `rungs.table`.
         robot: path of the robot's MJCF.
         arena: path of the arena's MJCF.
         sha256: of each file compiled: `arena`, `robot`, and all others by path.
@@ -53,6 +54,7 @@ class Scene:
     model: mujoco.MjModel
     n_substeps: int
     wheels: np.ndarray
+    name: str
     robot: Path
     arena: Path
     sha256: Mapping[str, str]
@@ -169,6 +171,7 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
         model,
         n_substeps,
         np.array(wheels),
+        Path(robot).stem,
         robot_path,
         arena_path,
         made.sha256,

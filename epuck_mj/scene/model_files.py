@@ -12,6 +12,9 @@ MODELS = next(
 )
 
 SHIPPED_ROBOTS = ("epuck.xml", "epuck_planar.xml")
+KINEMATIC_ROBOT = "epuck_kinematic"
+"""Name of the robot on wheels when it is simulated without MuJoCo's physics."""
+
 WHEELED_ROBOT, PLANAR_ROBOT = "epuck", "epuck_planar"
 """Every champion is reported on the first, whatever it was evolved on, and what was
 evolved on it on the second as well."""
@@ -20,7 +23,7 @@ evolved on it on the second as well."""
 def absolute(name: str) -> str:
     """The name of a robot or arena; if it is a path to a file, the absolute path."""
     path = Path(name)
-    shipped = {file.stem for file in MODELS.rglob("*.xml")}
+    shipped = {KINEMATIC_ROBOT, *(file.stem for file in MODELS.rglob("*.xml"))}
     return name if name in shipped or not is_file(path) else str(path.resolve())
 
 
@@ -30,7 +33,12 @@ def find_robot(name: str) -> Path:
     Raises:
         UserError: if there is none.
     """
-    return _find(name, "robot", [MODELS / robot for robot in SHIPPED_ROBOTS])
+    by_name = {
+        # the same robot, simulated in another way
+        KINEMATIC_ROBOT: MODELS / "epuck.xml",
+        **{Path(file).stem: MODELS / file for file in SHIPPED_ROBOTS},
+    }
+    return find(name, "robot", by_name, "an MJCF").resolve()
 
 
 def find_arena(name: str) -> Path:
@@ -40,10 +48,5 @@ def find_arena(name: str) -> Path:
         UserError: if there is none.
     """
     arenas = [MODELS / "arena.xml", *sorted(MODELS.glob("arenas/*.xml"))]
-    return _find(name, "arena", arenas)
-
-
-def _find(name: str, kind: str, shipped: list[Path]) -> Path:
-    """The file of a shipped model, or the user's own."""
-    by_name = {path.stem: path for path in shipped}
-    return find(name, kind, by_name, "an MJCF").resolve()
+    by_name = {path.stem: path for path in arenas}
+    return find(name, "arena", by_name, "an MJCF").resolve()

@@ -6,11 +6,15 @@ which it uses has changed. So the folder's name has a hash of all sources that m
 
 import hashlib
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import config
+from numba.core import config as _config
+
+config: Any = _config
+"""numba's settings, whose names no type checker knows."""
 
 _PACKAGE = Path(__file__).resolve().parents[2]
 
@@ -27,11 +31,9 @@ def _folders() -> list[Path]:
     text = b"".join(path.read_bytes() for path in SOURCES)
     name = f"kinematic-{hashlib.sha256(text).hexdigest()[:16]}"
     folders = [Path(__file__).parent / "__pycache__" / name]
-    try:
+    # not everybody has a home
+    with suppress(RuntimeError):
         folders.append(Path.home() / ".cache" / "epuck-mj" / name)
-    except RuntimeError:
-        # somebody without a home
-        pass
     return [folder for folder in folders if _is_writable(folder)]
 
 

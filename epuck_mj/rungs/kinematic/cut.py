@@ -1,10 +1,9 @@
-"""Outlines of geoms: cut at the height of rays, and as a shell between two heights meets
-them.
+"""Outlines of geoms, seen from above.
 
-An upright shell touches a convex solid where the solid's part between the shell's bottom
-and top, seen from above, comes nearer than the shell's radius. So all outlines are flat:
-sides of polygons, and ellipses whose axes are horizontal. They are exact; a geom that
-has no such outline is refused.
+Rays meet what lies at their height. An upright shell touches a convex solid where the
+solid's part between the shell's bottom and top, seen from above, comes nearer than the
+shell's radius. So all outlines are flat: sides of polygons, and ellipses. They are
+exact; a geom without such an outline is refused.
 """
 
 from dataclasses import dataclass, field

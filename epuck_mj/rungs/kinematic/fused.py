@@ -4,8 +4,9 @@ The same operations in the same order as `control.run_trials` with `KinematicRob
 so with the same bits, one trial after the other.
 """
 
+import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -351,13 +352,14 @@ def trials(
                 break
 
 
-@dataclass(frozen=True, eq=False)
 class FusedTrials:
-    """Compiled trials in one scene; call it with controllers and starts."""
+    """Compiled trials in one scene; see `CompiledTrials`."""
 
-    scene: Scene
-    task: TaskParameters
-    threads: int
+    def __init__(self, scene: Scene, task: TaskParameters, threads: int = 0):
+        """Store what a trial is; `threads` 0 is one per core."""
+        self._scene, self._task = scene, task
+        self._threads = threads or os.cpu_count() or 1
+        self._plans: dict[float, Plan] = {}
 
     def __call__(
         self,
@@ -367,43 +369,24 @@ class FusedTrials:
         per_individual: int,
         to_beat: np.ndarray,
     ) -> Trials:
-        """Trials `(n,)`.
+        """See `CompiledTrials`.
 
-        Args:
-            controller: one per trial.
-            starts: poses `(n, 3)`: x, y [m], yaw [rad].
-            disturbances: of the trials; None for ideal robots.
-            per_individual: trials of each individual.
-            to_beat: sum of its fitness below which an individual may be broken off,
-                `(n / per_individual,)`; -inf where it may not.
+        Raises:
+            UserError: if the scene has no plan.
         """
-        n = len(starts)
-        noise, of = _noise(disturbances, n, self.task)
-        noisy = disturbances is not None
-        reach = self.task.sensor_range
-        if noisy:
-            reach = max(reach, PROXIMITY_REACH)
-        plan = plan_of(self.scene, reach, self.task.control_step)
-        speeds = self.task.speeds
-        count, substep = substeps(self.task.control_step)
-        task = Task(
-            self.task.steps,
-            FITNESS.index(self.task.fitness),
-            1.0,
-            self.task.sensor_range,
-            reach,
-            speeds.forward / WHEEL_RADIUS,
-            speeds.turn * TRACK / (2 * WHEEL_RADIUS),
-            WHEEL_SPEED_MAX,
-            count,
-            substep,
-        )
-        mass = disturbances.mass[of] if disturbances is not None else np.ones(n)
-        states, lag = at_rest(starts), lags(plan, mass, self.task.control_step)
+        n, time = len(starts), self._task.control_step
+        noise, of = _noise(disturbances, n, time)
+        reach = self._task.sensor_range
+        mass = np.ones(n)
+        if disturbances is not None:
+            reach, mass = max(reach, PROXIMITY_REACH), disturbances.mass[of]
+        plan = self._plan(reach)
+        task = self._compiled_task(reach)
+        states, lag = at_rest(starts), lags(plan, mass, time)
         fitness, steps = np.zeros(n), np.zeros(n, np.int64)
         crashed = np.zeros(n, bool)
 
-        def run(part: np.ndarray) -> None:
+        def run(part: tuple[int, int]) -> None:
             trials(
                 plan,
                 task,
@@ -413,8 +396,7 @@ class FusedTrials:
                 controller.output,
                 states,
                 lag,
-                part[0],
-                part[1],
+                *part,
                 per_individual,
                 to_beat,
                 fitness,
@@ -422,24 +404,43 @@ class FusedTrials:
                 crashed,
             )
 
-        parts = _parts(n // per_individual, self.threads)
+        parts = _parts(n // per_individual, self._threads)
         if len(parts) == 1:
             run(parts[0])
         else:
-            with ThreadPoolExecutor(self.threads) as pool:
+            with ThreadPoolExecutor(self._threads) as pool:
                 list(pool.map(run, parts))
         return Trials(fitness, steps, crashed)
+
+    def _plan(self, reach: float) -> Plan:
+        if reach not in self._plans:
+            self._plans[reach] = plan_of(self._scene, reach, self._task.control_step)
+        return self._plans[reach]
+
+    def _compiled_task(self, reach: float) -> Task:
+        speeds = self._task.speeds
+        return Task(
+            self._task.steps,
+            FITNESS.index(self._task.fitness),
+            1.0,
+            self._task.sensor_range,
+            reach,
+            speeds.forward / WHEEL_RADIUS,
+            speeds.turn * TRACK / (2 * WHEEL_RADIUS),
+            WHEEL_SPEED_MAX,
+            *substeps(self._task.control_step),
+        )
 
 
 def _parts(individuals: int, threads: int) -> list[tuple[int, int]]:
     """First and last individual of each part, several for each thread."""
-    n = 1 if threads == 1 else min(individuals, 4 * threads)
+    n = 1 if threads == 1 else max(1, min(individuals, 4 * threads))
     bounds = np.linspace(0, individuals, n + 1).astype(int).tolist()
-    return list(zip(bounds, bounds[1:], strict=False))
+    return list(pairwise(bounds))
 
 
 def _noise(
-    given: Disturbances | None, n: int, task: TaskParameters
+    given: Disturbances | None, n: int, control_step: float
 ) -> tuple[Noise, np.ndarray]:
     """Disturbances for the kernel, and which of them each of `n` trials meets."""
     if given is None:
@@ -465,7 +466,7 @@ def _noise(
         given.gains,
         np.ascontiguousarray(np.moveaxis(tables, 1, 2)),
         table.reshape(-1).astype(np.int64),
-        given.age / task.control_step,
+        given.age / control_step,
         given.count_noise,
         given.wheel_gains,
         given.turn_gain,

@@ -113,12 +113,14 @@ def plan_of(scene: Scene, reach: float, control_step: float) -> Plan:
     Raises:
         UserError: if the robot or a geom of the arena cannot be put into a plan.
     """
-    body, *robot = _robot(scene)
+    body, rays, lag, massless = _robot(scene)
     # larger wheels turn faster, too
     way = SPARE_SPEED * control_step * body.speed_max * body.wheel_radius
     return Plan(
         body,
-        *robot,
+        rays,
+        lag,
+        massless,
         _walls(*_outlines(scene, False), body.shell + reach),
         _walls(*_outlines(scene, True), body.shell + way),
     )
