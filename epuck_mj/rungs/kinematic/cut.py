@@ -19,7 +19,7 @@ _SHAPE = mujoco.mjtGeom
 UPRIGHT = 1e-9
 """How far from 0 or 1 the vertical part of an upright geom's axis may be."""
 
-PLANE_SIZE = 1000.0
+PLANE_SIZE = 1e5
 """Half length of the outline of an endless plane [m]."""
 
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
