@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT
 from evolution.judging.evaluation import Engine, evaluate
 from evolution.judging.held_out_starts import (
     held_out_disturbances,
@@ -22,6 +23,12 @@ BEST_OF_POPULATION = 0.1
 
 LATEST_BEST = 20
 """Number of the latest best-so-far individuals that are candidates."""
+
+SCREENED = 10
+"""Number of the best on the kinematic robot that are tested on more starts there."""
+
+N_SCREENING = 1000
+"""Number of these starts."""
 
 
 @dataclass(frozen=True)
@@ -39,16 +46,23 @@ class Champion:
     validation_fitness: float
 
 
-def candidates(evolution: Evolution) -> tuple[np.ndarray, np.ndarray]:
-    """Genomes `(n, genes)` of the candidates and their stored fitness `(n,)`."""
+def candidates(
+    evolution: Evolution, share: float = BEST_OF_POPULATION
+) -> tuple[np.ndarray, np.ndarray]:
+    """Genomes `(n, genes)` of the candidates and their stored fitness `(n,)`.
+
+    Args:
+        evolution: a finished run.
+        share: of the final population whose members are candidates.
+    """
     population, fitness = evolution.optimizer.population, evolution.optimizer.fitness
-    n_best = max(1, round(BEST_OF_POPULATION * len(population)))
+    n_best = max(1, round(share * len(population)))
     order = np.argsort(-fitness, kind="stable")[:n_best]
     # the generations that raised the run's best
-    best = np.array([record.best for record in evolution.records])
+    first, best = _best_at_last(evolution)
     before = np.concatenate([[-np.inf], np.maximum.accumulate(best)[:-1]])
     raised = np.flatnonzero(best > before)[-LATEST_BEST:]
-    genomes = [population[order], np.array(evolution.best_genomes)[raised]]
+    genomes = [population[order], np.array(evolution.best_genomes)[first + raised]]
     genomes, stored = (
         np.concatenate(genomes),
         np.concatenate([fitness[order], best[raised]]),
@@ -63,22 +77,63 @@ def most_believed(evolution: Evolution) -> tuple[np.ndarray, float]:
 
     What a run without held-out starts would show as its best.
     """
-    best = [record.best for record in evolution.records]
+    first, best = _best_at_last(evolution)
     generation = int(np.argmax(best))
-    return evolution.best_genomes[generation], best[generation]
+    return evolution.best_genomes[first + generation], float(best[generation])
 
 
-def choose_champion(engine: Engine, evolution: Evolution) -> Champion:
-    """The candidate with the highest mean on the validation starts."""
+def _best_at_last(evolution: Evolution) -> tuple[int, np.ndarray]:
+    """First generation on the robot of the last, and the best fitness since then."""
+    records = evolution.records
+    same = [record.climbed == evolution.climbed for record in records]
+    first = same.index(True)
+    return first, np.array([record.best for record in records[first:]])
+
+
+def choose_champion(
+    engine: Engine, evolution: Evolution, wheels: Engine | None = None
+) -> Champion:
+    """The candidate with the highest mean on validation starts.
+
+    On the kinematic robot trials cost next to nothing, so all of the final population
+    are candidates, and the best are tested on more starts. The best of these are
+    compared on wheels.
+
+    Args:
+        engine: of the robot that evolution began with.
+        evolution: a finished run.
+        wheels: engine of the robot on wheels, for finalists.
+    """
     config = evolution.config
-    genomes, stored = candidates(evolution)
-    starts = starts_for_validation(evolution.space, config.validation_starts)
+    n = config.validation_starts
+    if config.robot != KINEMATIC_ROBOT:
+        genomes, stored = candidates(evolution)
+        return _best(genomes, stored, _validated(engine, evolution, genomes, n))
+    genomes, stored = candidates(evolution, share=1.0)
+    rounds = [(engine, n, SCREENED), (engine, max(n, N_SCREENING), config.finalists)]
+    if config.finalists and wheels is not None:
+        rounds.append((wheels, n, 1))
+    fitness = stored
+    for judge, starts, kept in rounds:
+        fitness = _validated(judge, evolution, genomes, starts)
+        order = np.argsort(-fitness, kind="stable")[: max(kept, 1)]
+        genomes, stored, fitness = genomes[order], stored[order], fitness[order]
+    return _best(genomes, stored, fitness)
+
+
+def _validated(
+    engine: Engine, evolution: Evolution, genomes: np.ndarray, n: int
+) -> np.ndarray:
+    """Mean fitness of genomes `(k, genes)` on `n` validation starts, `(k,)`."""
+    config = evolution.config
+    starts = starts_for_validation(evolution.space, n)
     # as it was evolved: robots that are disturbed alike
     met = held_out_disturbances(
         config.conditions, Purpose.VALIDATION, len(starts), config.steps
     )
-    fitness = evaluate(
-        engine, config.topology, genomes, starts, disturbances=met
-    ).fitness
+    return evaluate(engine, config.topology, genomes, starts, disturbances=met).fitness
+
+
+def _best(genomes: np.ndarray, stored: np.ndarray, fitness: np.ndarray) -> Champion:
     best = int(fitness.argmax())
     return Champion(genomes[best], float(stored[best]), float(fitness[best]))

@@ -4,13 +4,14 @@ Consumers (progress, checkpoints, figures) read the records and cannot change th
 result. Randomness is keyed by what it is for: `random_generator(seed, purpose, ...)`.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import astuple, dataclass
 
 import numpy as np
 
 from epuck_mj.errors import UserError
 from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.disturbances import Disturbances
 from evolution.judging.evaluation import BatchEngine, DmControlEngine, Engine, evaluate
@@ -34,6 +35,8 @@ class Record:
         control_steps: of all its trials together; racing makes them fewer.
         crash_rate: share of its trials that ended in a crash; racing breaks some off
             before they can.
+        climbed: whether its trials were on wheels in MuJoCo, after others that were
+            not.
     """
 
     generation: int
@@ -43,22 +46,31 @@ class Record:
     std: float
     control_steps: int
     crash_rate: float
+    climbed: bool = False
 
 
 ARRAYS = {"records": len(Record.__dataclass_fields__), "best_genomes": None}
 """Arrays of a state, one row per generation, and their columns (None: genes)."""
 
 HISTORY: tuple[str, ...] = ("generation", "evaluations", "best", "mean", "std")
-"""Columns of history.csv: racing changes none of them."""
+"""Columns of history.csv, before the robot: racing changes none of them."""
+
+EngineMaker = Callable[[Scene], Engine]
+"""Makes the engine for a scene; its `str` is what the provenance calls it."""
 
 
 class Evolution:
-    """A run of evolution that can be stopped and resumed between generations."""
+    """A run of evolution that can be stopped and resumed between generations.
+
+    A run that climbs begins on the kinematic robot, which is cheap, and spends the rest
+    of its budget on wheels in MuJoCo. There its population is evaluated anew, paid from
+    the budget: no fitness of the cheap simulator survives.
+    """
 
     def __init__(
         self,
         config: ExperimentConfig,
-        engine: str | Engine = "batch",
+        engine: str | EngineMaker = "batch",
         threads: int = 0,
         racing: bool = True,
     ):
@@ -66,8 +78,8 @@ class Evolution:
 
         Args:
             config: what to do.
-            engine: one of `ENGINES`, or an engine: how trials are stepped, not what
-                they give.
+            engine: one of `ENGINES`, or a maker of engines: how trials are stepped, not
+                what they give.
             threads: of the batch engine; 0 is one per core.
             racing: break off individuals that can only lose; changes no result.
 
@@ -77,9 +89,15 @@ class Evolution:
         self.config = config
         self.scene = load_scene(config.robot, config.arena, config.control_step)
         self.space = FreeSpace(self.scene, config.start_clearance)
-        if isinstance(engine, str):
-            engine = make_engine(engine, self.scene, config, threads)
-        self.engine = engine
+        self._wheels = self.scene
+        if config.climbs:
+            self._wheels = load_scene(WHEELED_ROBOT, config.arena, config.control_step)
+        self._maker: EngineMaker = (
+            (lambda scene: make_engine(engine, scene, config, threads))
+            if isinstance(engine, str)
+            else engine
+        )
+        self.engine = self._maker(self.scene)
         # that an individual can only lose shows only if fitness has a maximum
         self.racing = racing and config.task.step_fitness.maximum is not None
         self.optimizer = _optimizer(config)
@@ -98,9 +116,22 @@ class Evolution:
         return self.records[-1].evaluations if self.records else 0
 
     @property
+    def climbed(self) -> bool:
+        """Whether evolution has gone on to wheels."""
+        return bool(self.records) and self.records[-1].climbed
+
+    @property
+    def _climbs_now(self) -> bool:
+        """Whether the next generation is the first on wheels."""
+        share = self.config.climb * self.config.evaluations
+        return self.config.climbs and not self.climbed and self.evaluations >= share
+
+    @property
     def finished(self) -> bool:
         """Whether the budget has no evaluations left for another generation."""
         size = self.optimizer.next_size()
+        if self._climbs_now:
+            size += len(self.optimizer.population)
         return self.evaluations + size > self.config.evaluations
 
     def run(self) -> Iterator[Record]:
@@ -114,28 +145,33 @@ class Evolution:
         # the same starts for every individual, and for every algorithm of that seed
         rng = random_generator(config.seed, Purpose.STARTS, generation)
         starts = self.space.sample(rng, config.trials)
+        met, climbs = self._disturbances(generation), self._climbs_now
+        spent, evaluations = self.evaluations, []
+        if climbs:
+            self.engine = self._maker(self._wheels)
+            known = self.optimizer.population
+            anew = evaluate(self.engine, config.topology, known, starts, None, met)
+            self.optimizer.judge_anew(anew.fitness)
+            spent += len(known)
+            evaluations.append(anew)
         genomes = self.optimizer.ask()
         to_beat = self.optimizer.to_beat() if self.racing else None
-        evaluation = evaluate(
-            self.engine,
-            config.topology,
-            genomes,
-            starts,
-            to_beat,
-            self._disturbances(generation),
+        evaluations.append(
+            evaluate(self.engine, config.topology, genomes, starts, to_beat, met)
         )
-        self.optimizer.tell(evaluation.fitness)
+        self.optimizer.tell(evaluations[-1].fitness)
         # the worst there is, what NaN counts as, is no number for a mean
         stored = self.optimizer.fitness
         fitness = np.where(np.isneginf(stored), 0.0, stored)
         record = Record(
             generation=generation,
-            evaluations=self.evaluations + len(genomes),
+            evaluations=spent + len(genomes),
             best=float(fitness.max()),
             mean=float(fitness.mean()),
             std=float(fitness.std()),
-            control_steps=int(evaluation.steps.sum()),
-            crash_rate=float(evaluation.crashed.mean()),
+            control_steps=sum(int(each.steps.sum()) for each in evaluations),
+            crash_rate=float(np.concatenate([e.crashed for e in evaluations]).mean()),
+            climbed=self.climbed or climbs,
         )
         self.records.append(record)
         self.best_genomes.append(self.optimizer.population[fitness.argmax()].copy())
@@ -165,8 +201,8 @@ class Evolution:
         prefix = "optimizer."
         rows, genomes = (self._array(state, name) for name in ARRAYS)
         records = [
-            Record(int(index), int(spent), best, mean, std, int(steps), crashed)
-            for index, spent, best, mean, std, steps, crashed in rows.tolist()
+            Record(int(k), int(n), best, mean, std, int(steps), crashed, bool(climbed))
+            for k, n, best, mean, std, steps, crashed, climbed in rows.tolist()
         ]
         self.optimizer.restore(
             {
@@ -177,6 +213,8 @@ class Evolution:
         )
         self.records = records
         self.best_genomes = list(genomes)
+        if self.climbed:
+            self.engine = self._maker(self._wheels)
 
     def _array(self, state: Mapping[str, np.ndarray], name: str) -> np.ndarray:
         """A float array of a state, one row per generation told."""
@@ -195,10 +233,11 @@ class Evolution:
     def history(self) -> str:
         """Text of history.csv, without times, with floats that read back exactly."""
         rows = [
-            ",".join(repr(getattr(record, name)) for name in HISTORY)
+            ",".join([*(repr(getattr(record, name)) for name in HISTORY), robot])
             for record in self.records
+            for robot in [WHEELED_ROBOT if record.climbed else self.scene.name]
         ]
-        return "\n".join([",".join(HISTORY), *rows]) + "\n"
+        return "\n".join([",".join([*HISTORY, "robot"]), *rows]) + "\n"
 
 
 def _optimizer(config: ExperimentConfig) -> Optimizer:
@@ -218,7 +257,8 @@ def make_engine(
     Raises:
         UserError: if there is none.
     """
-    if name == "batch":
+    # dm_control steps MuJoCo: what is not simulated there has no other engine
+    if name == "batch" or (name in ENGINES and scene.name == KINEMATIC_ROBOT):
         return BatchEngine(scene, config.task, threads)
     if name == "dm_control":
         if config.noise != "none":

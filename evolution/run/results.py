@@ -57,8 +57,11 @@ def write_results(
     number = itertools.count()
     fresh = f"{config.validation_starts:,} fresh starts"
     stage(f"Choosing the champion on {fresh}", next(number), stages)
-    engine = BatchEngine(evolution.scene, config.task, threads)
-    champion = choose_champion(engine, evolution)
+    engine, wheels = (
+        BatchEngine(scene, config.task, threads)
+        for scene in (evolution.scene, judges[WHEELED_ROBOT].scene)
+    )
+    champion = choose_champion(engine, evolution, wheels)
     policy = config.topology.decode(champion.genome)
     held_out, as_evolved = {}, {}
     for robot, judge in judges.items():

@@ -184,6 +184,19 @@ class Optimizer(ABC):
         self.generation += 1
         self._asked = None
 
+    def judge_anew(self, fitness: ArrayLike) -> None:
+        """Replace the stored fitness of the population `(population,)`; NaN is -inf.
+
+        For when what fitness means has changed: nothing of the old survives. An
+        algorithm that keeps fitness elsewhere, too, replaces that as well.
+
+        Raises:
+            AskTellError: genomes asked have not been told, or another shape was
+                expected.
+        """
+        self._refuse_pending("judge anew")
+        self.fitness = read_only(checked_fitness(fitness, len(self.population)))
+
     def state(self) -> dict[str, np.ndarray]:
         """Everything the next generations depend on, as plain arrays.
 

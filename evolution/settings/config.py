@@ -22,7 +22,7 @@ from epuck_mj.host.own_parts import is_own, located, own_part
 from epuck_mj.host.yaml_and_json import parse_yaml, to_yaml
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.topology import OwnNetwork, Topology
-from epuck_mj.scene.model_files import absolute
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, absolute
 from epuck_mj.step.conditions import Conditions, NoiseLevel
 from epuck_mj.step.control import START_CLEARANCE, STEPS_MAX, TaskParameters
 from epuck_mj.step.motors import Speeds
@@ -54,9 +54,18 @@ class ExperimentConfig(BaseModel):
         "generations",
     )
     robot: Annotated[str, word("ROBOT")] = Field(
-        "epuck_planar",
-        description="epuck_planar (slides on a plane), epuck (drives on wheels) or the "
-        "path of an MJCF file",
+        KINEMATIC_ROBOT,
+        description="epuck_kinematic (the robot on wheels without physics: hundreds "
+        "of times faster), epuck (on wheels in MuJoCo), epuck_planar (slides on a "
+        "plane in MuJoCo) or the path of an MJCF file",
+    )
+    climb: StrictFloat = Field(
+        0.9,
+        gt=0,
+        le=1,
+        description="share of the evaluations that are spent on epuck_kinematic; the "
+        "rest is spent on epuck, where the population is evaluated anew; 1: none is; "
+        "without effect on other robots",
     )
     arena: Annotated[str, word("ARENA")] = Field(
         "arena", description="name of a shipped arena or the path of an MJCF file"
@@ -126,6 +135,14 @@ class ExperimentConfig(BaseModel):
         description="number of starts on which the champion is chosen; evolution does "
         "not use them",
     )
+    finalists: StrictInt = Field(
+        5,
+        ge=0,
+        le=1000,
+        description="number of the best on epuck_kinematic among which the champion "
+        "is chosen on epuck; 0: it is the best on epuck_kinematic; without effect on "
+        "other robots",
+    )
     test_starts: StrictInt = Field(
         N_TEST,
         ge=2,
@@ -140,6 +157,11 @@ class ExperimentConfig(BaseModel):
         """Refuse conditions that exclude each other."""
         _ = self.conditions
         return self
+
+    @property
+    def climbs(self) -> bool:
+        """Whether a run ends on another robot than it begins with."""
+        return self.robot == KINEMATIC_ROBOT and self.climb < 1
 
     @property
     def conditions(self) -> Conditions:

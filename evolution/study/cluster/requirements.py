@@ -17,7 +17,7 @@ from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.settings.config import ExperimentConfig
 
-DECIDING = ("epuck-mj", "mujoco", "numpy", "scipy", "contourpy", "cmaes")
+DECIDING = ("epuck-mj", "mujoco", "numpy", "scipy", "contourpy", "cmaes", "numba")
 """Packages whose versions change the bits of results."""
 
 
@@ -90,11 +90,16 @@ def code() -> str:
     return digest.hexdigest()[:12]
 
 
-def requirements_of(config: ExperimentConfig) -> Requirements:
+def requirements_of(config: ExperimentConfig, robot: str | None = None) -> Requirements:
     """The requirements of a run, as met by this machine.
+
+    Args:
+        config: of the run.
+        robot: whose trials are asked for; None for the config's.
 
     Raises:
         UserError: as `Requirements.here`.
     """
     own = tuple(config.own_parts)
-    return Requirements.here(config.robot, config.arena, config.control_step, own)
+    robot = robot or config.robot
+    return Requirements.here(robot, config.arena, config.control_step, own)

@@ -5,9 +5,10 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 
-from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 from epuck_mj.step.control import TaskParameters, Trials
-from evolution.judging.evaluation import CAPACITY, BatchEngine, Work
+from evolution.judging.evaluation import CAPACITY, BatchEngine, Engine, Work
 from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 from evolution.study.cluster.connection import Cluster, ClusterLost
@@ -26,7 +27,7 @@ def split_runs(jobs: Sequence[Job], cluster: Cluster, racing: bool) -> Iterator[
     for job in jobs:
         failure = None
         try:
-            means = Means(ClusterEngine(cluster, job.config), racing=racing)
+            means = Means(ClusterEngines(cluster, job.config), racing=racing)
             with closing(generations(job, means)) as steps:
                 for evaluations in steps:
                     yield Event(job, evaluations)
@@ -38,22 +39,37 @@ def split_runs(jobs: Sequence[Job], cluster: Cluster, racing: bool) -> Iterator[
         yield Event(job, ended=True, failure=failure)
 
 
-class ClusterEngine:
-    """Engine that runs parts of the trials on the threads of a cluster."""
+class ClusterEngines:
+    """Maker of a run's engines; an `EngineMaker`."""
 
     def __init__(self, cluster: Cluster, config: ExperimentConfig):
-        """Store the requirements on workers.
+        """Store what they are made of."""
+        self._cluster, self._config = cluster, config
+
+    def __call__(self, scene: Scene) -> Engine:
+        """The engine for a scene: what takes seconds stays here.
 
         Raises:
             UserError: as `requirements_of`.
         """
-        self._cluster = cluster
-        self._required = requirements_of(config)
-        self._task = config.task
+        if scene.name == KINEMATIC_ROBOT:
+            return BatchEngine(scene, self._config.task)
+        # a run that has climbed is on another robot than it began with
+        robot = WHEELED_ROBOT if self._config.climbs else self._config.robot
+        required = requirements_of(self._config, robot)
+        return ClusterEngine(self._cluster, required, self._config.task)
 
     def __str__(self) -> str:
-        """Name of the engine in a run's provenance."""
+        """Name of the engines in a run's provenance."""
         return "cluster"
+
+
+class ClusterEngine:
+    """Engine that runs parts of the trials on the threads of a cluster."""
+
+    def __init__(self, cluster: Cluster, required: Requirements, task: TaskParameters):
+        """Store the requirements on workers, and what a trial is."""
+        self._cluster, self._required, self._task = cluster, required, task
 
     def run(self, work: Work) -> Trials:
         """See `Engine.run`.
