@@ -1,0 +1,173 @@
+"""Runs that climb from the kinematic robot to wheels: nothing believed is carried on."""
+
+import numpy as np
+import pytest
+
+from evolution.judging.evaluation import BatchEngine, Work
+from evolution.run.champion import candidates, choose_champion, most_believed
+from evolution.run.generation_loop import Evolution
+from evolution.search.ask_tell import AskTellError
+from evolution.settings.config import ExperimentConfig
+
+OPTIMIZERS = {
+    "ga": {
+        "algorithm": "genetic_algorithm",
+        "population": 8,
+        "bits": 8,
+        "tournament": 2,
+        "crossover": 0.8,
+        "mutation": 0.02,
+        "elites": 1,
+    },
+    "de": {
+        "algorithm": "differential_evolution",
+        "strategy": "best",
+        "population": 8,
+        "scale": 0.7,
+        "crossover": 0.9,
+    },
+    "cma-es": {"algorithm": "cma_es", "population": 8},
+    "es": {"algorithm": "evolution_strategy", "lineages": 8},
+    "random": {"algorithm": "random_search", "population": 8},
+}
+
+
+def config(name: str = "de", **more) -> ExperimentConfig:
+    fields = {
+        "evaluations": 80,
+        "steps": 15,
+        "trials": 2,
+        "climb": 0.5,
+        "validation_starts": 6,
+        "optimizer": OPTIMIZERS[name],
+    }
+    return ExperimentConfig.parsed(fields | more, "config")
+
+
+def evolved(config: ExperimentConfig, **how) -> Evolution:
+    evolution = Evolution(config, **{"threads": 1, **how})
+    list(evolution.run())
+    return evolution
+
+
+class Watched:
+    """Engine that notes on which robot how many trials were run."""
+
+    def __init__(self, scene, task, seen: list[tuple[str, int]]):
+        self._engine, self._name, self._seen = (
+            BatchEngine(scene, task, 1),
+            scene.name,
+            seen,
+        )
+
+    def run(self, work: Work):
+        self._seen.append((self._name, len(work)))
+        return self._engine.run(work)
+
+
+@pytest.mark.parametrize("name", OPTIMIZERS)
+def test_the_population_is_evaluated_anew_and_paid_for(name):
+    seen: list[tuple[str, int]] = []
+    c = config(name)
+    evolution = Evolution(c, lambda scene: Watched(scene, c.task, seen))
+    before = np.full(8, np.nan)
+    for record in evolution.run():
+        if not record.climbed:
+            before = evolution.optimizer.fitness.copy()
+        elif not evolution.records[-2].climbed:
+            # of what was stored before, nothing is left
+            assert not np.isin(evolution.optimizer.fitness, before[before > 1e-3]).any()
+    # five generations of 8; then each of 8, and 8 more once
+    trials = [(robot, n // 2) for robot, n in seen]
+    assert trials[:5] == [("epuck_kinematic", 8)] * 5
+    assert trials[5:] == [("epuck", 8)] * 5
+    spent = [record.evaluations for record in evolution.records]
+    assert spent == [8, 16, 24, 32, 40, 56, 64, 72, 80]
+    assert [record.climbed for record in evolution.records] == [False] * 5 + [True] * 4
+    robots = [line.split(",")[-1] for line in evolution.history().splitlines()]
+    assert robots == ["robot", *["epuck_kinematic"] * 5, *["epuck"] * 4]
+
+
+@pytest.mark.parametrize(
+    ("more", "robots"),
+    [
+        ({"climb": 1.0}, {"epuck_kinematic"}),
+        ({"robot": "epuck"}, {"epuck"}),
+        ({"robot": "epuck_planar"}, {"epuck_planar"}),
+        # nothing is left for a climb
+        ({"climb": 0.95}, {"epuck_kinematic"}),
+    ],
+)
+def test_not_every_run_climbs(more, robots):
+    lines = evolved(config(**more)).history().splitlines()[1:]
+    assert {line.split(",")[-1] for line in lines} == robots
+
+
+@pytest.mark.parametrize("name", OPTIMIZERS)
+def test_resumed_anywhere_it_ends_the_same(name):
+    whole = evolved(config(name))
+    expected = whole.history()
+    for generations in (4, 5, 6):
+        begun = Evolution(config(name), threads=1)
+        for record in begun.run():
+            if record.generation == generations:
+                break
+        resumed = Evolution(config(name), threads=1)
+        resumed.restore(begun.state())
+        list(resumed.run())
+        assert resumed.history() == expected
+        np.testing.assert_array_equal(
+            resumed.optimizer.population, whole.optimizer.population
+        )
+
+
+def test_engine_threads_and_racing_change_nothing():
+    c = config(evaluations=120, steps=30)
+    expected = evolved(c).history()
+    assert expected.count("epuck\n") > 2
+    for how in ({"threads": 2}, {"racing": False}, {"engine": "dm_control"}):
+        assert evolved(c, **how).history() == expected
+
+
+def test_what_is_judged_anew_has_to_fit():
+    optimizer = Evolution(config()).optimizer
+    with pytest.raises(AskTellError, match=r"expected fitness of shape \(8,\)"):
+        optimizer.judge_anew(np.zeros(7))
+    optimizer.ask()
+    with pytest.raises(AskTellError, match="cannot judge anew"):
+        optimizer.judge_anew(np.zeros(8))
+    optimizer.tell(np.zeros(8))
+    optimizer.judge_anew([1, 2, 3, 4, 5, 6, 7, np.nan])
+    assert optimizer.fitness[6] == 7
+    assert optimizer.fitness[7] == -np.inf
+
+
+def test_only_what_was_stored_on_wheels_counts_as_best_after_a_climb():
+    evolution = evolved(config())
+    cheap = evolution.records[:5]
+    evolution.records[0] = type(cheap[0])(0, 8, 1e9, 0.0, 0.0, 1, 0.0)
+    genome, stored = most_believed(evolution)
+    assert stored < 1e9
+    assert any((genome == other).all() for other in evolution.best_genomes[5:])
+    assert candidates(evolution)[1].max() < 1e9
+
+
+@pytest.mark.parametrize("finalists", [0, 1, 3])
+def test_finalists_are_compared_on_wheels(monkeypatch, finalists):
+    monkeypatch.setattr("evolution.run.champion.N_SCREENING", 10)
+    c = config(finalists=finalists)
+    evolution = evolved(c)
+    seen: list[tuple[str, int]] = []
+    cheap, wheels = (
+        Watched(scene, c.task, seen) for scene in (evolution.scene, evolution._wheels)
+    )
+    champion = choose_champion(cheap, evolution, wheels)
+    everybody = len(candidates(evolution, share=1.0)[0])
+    assert everybody >= 8
+    expected = [("epuck_kinematic", everybody * 6), ("epuck_kinematic", 8 * 10)]
+    if everybody > 8:
+        expected[1] = ("epuck_kinematic", min(everybody, 10) * 10)
+    if finalists:
+        expected.append(("epuck", finalists * 6))
+    assert seen == expected
+    assert np.isfinite(champion.validation_fitness)
