@@ -1,4 +1,4 @@
-"""Runs that climb from the kinematic robot to wheels: nothing believed is carried on."""
+"""Runs that climb from the kinematic robot to wheels, with nothing believed kept."""
 
 import numpy as np
 import pytest
