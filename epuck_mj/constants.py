@@ -226,8 +226,20 @@ CONNECT_TIME_MAX = 5.0
 Chosen: longer than an e-puck takes to calibrate itself as it starts.
 """
 
-STOP_TIME_MAX = 5.0
-"""How long a robot is told to stop while it does not confirm [s]. Chosen."""
+NOISE_TIME_MAX = 1.2
+"""Time after which what has come without an answer in it is no robot [s]. Chosen.
+
+Four times REPLY_TIME_MAX: answers that take longer come too late to drive by.
+"""
+
+STOP_TIME_MAX = 0.8
+"""How long a robot is told to stop while it does not confirm [s]. Chosen.
+
+With the age of a reading before it and the log after it, less than 2 s.
+"""
+
+PURSUIT_TIME = 5.0
+"""How long a robot that nobody could stop is told so by another process [s]. Chosen."""
 
 STOP_REPLY_TIME = 0.2
 """Time without an answer after which a robot is told to stop again [s]. Chosen."""

@@ -27,7 +27,6 @@ from epuck_mj.bridge.drive import mission
 from epuck_mj.bridge.drive.console import drive_summary, live_line
 from epuck_mj.bridge.fake.endpoints import Pty, Tcp
 from epuck_mj.bridge.fake.motors_and_sensors import Wheel
-from epuck_mj.bridge.line import serial_line, wifi_line
 from epuck_mj.constants import SPEED_MAX, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import SIGNALS, Interrupted, Interruption
@@ -117,14 +116,6 @@ def run(
         if disturbed or BUSY not in done.stderr or chance == 1:
             return done
     raise AssertionError("unreachable")
-
-
-@pytest.fixture
-def impatient(monkeypatch):
-    """Robots that cannot be reached are given up soon, by bridges in this process."""
-    for line in (serial_line, wifi_line):
-        monkeypatch.setattr(line, "STOP_TIME_MAX", 1.0)
-        monkeypatch.setattr(line, "CONNECT_TIME_MAX", 2.0)
 
 
 @pytest.fixture
@@ -243,15 +234,14 @@ def test_over_wifi(planar, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("impatient")
-@pytest.mark.parametrize("fault", ["stall", "disconnect", "gone"])
+@pytest.mark.parametrize("fault", ["stall@1.2", "disconnect@1.2+0.5", "gone@1.2"])
 def test_faults_over_wifi(planar, tmp_path, fault):
     endpoint = Tcp(0)
-    with living(endpoint, planar, AT_WALL, "wifi", f"{fault}@1.2") as emulator:
+    with living(endpoint, planar, AT_WALL, "wifi", fault) as emulator:
         name = endpoint.name.replace("socket:", "tcp:")
         done = run(name, tmp_path / "log", disturbed=True)
-        assert emulator.body.standing == (fault != "gone")
-    assert done.returncode == (4 if fault == "gone" else 3), done.stderr
+        assert emulator.body.standing == (fault != "gone@1.2")
+    assert done.returncode == (4 if fault == "gone@1.2" else 3), done.stderr
     assert done.stderr.count("\n") == 1
     assert "e-puck2 over WiFi, selector at 3" in done.stdout
     trajectory = Trajectory.load(tmp_path / "log.npz")
@@ -355,14 +345,13 @@ def test_a_reader_that_went_away(planar, port, tmp_path):
     [
         ("stall@1", 3, "expected a reading every 300 ms; came none: expected a reply"),
         ("reset@1", 3, "error: expected "),
-        ("disconnect@1", 3, "expected a robot at '"),
+        ("disconnect@1+0.5", 3, "expected a robot at '"),
         ("gone@1", 4, "THE MOTORS MAY STILL TURN, switch the robot off: "),
         ("loss@1+100", 3, "expected a reading every 300 ms"),
         ("noise@0.8,noise@1,noise@1.2,noise@1.4,noise@1.6,noise@1.8", None, ""),
         ("garbage@1,garbage@1.5", None, ""),
     ],
 )
-@pytest.mark.usefixtures("impatient")
 def test_faults(planar, port, tmp_path, faults, status, cause):
     arguments = ("--seconds", "2") if status is None else ()
     with living(port, planar, AT_WALL, faults=faults) as emulator:
@@ -379,7 +368,6 @@ def test_faults(planar, port, tmp_path, faults, status, cause):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("impatient")
 def test_a_robot_that_dies(tmp_path, at_each_line):
     with fake_process("--robot", "epuck_planar", "--tcp", "0") as (robot, name):
         at_each_line(robot.kill)
@@ -470,7 +458,6 @@ def test_a_champion_of_another_network(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("impatient")
 def test_a_device_that_is_no_robot(tmp_path):
     """It echoes whatever it hears: one line, status 2, and soon."""
     master, slave = pty.openpty()

@@ -472,7 +472,7 @@ def test_the_end_of_the_input(planar, output, steps, part):
     [
         ("stall@4", 3, "expected a reading every 300 ms"),
         ("reset@4", 3, "expected a"),
-        ("disconnect@4", 3, "expected a robot at 'virtual'"),
+        ("disconnect@4+0.5", 3, "expected a robot at 'virtual'"),
         ("gone@4", 4, "THE MOTORS MAY STILL TURN, switch the robot off"),
     ],
 )

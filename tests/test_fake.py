@@ -23,9 +23,9 @@ from epuck_mj.bridge.fake.scenarios import scenario
 from epuck_mj.bridge.language import ascii, binary
 from epuck_mj.bridge.language.protocol import RESYNC
 from epuck_mj.bridge.language.replies import Steps
+from epuck_mj.bridge.line.connect import open_port
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
-from epuck_mj.bridge.line.serial_port import SerialPort
 from epuck_mj.constants import TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import read_arrays
@@ -144,7 +144,7 @@ def test_pauses_of_slow_motors_are_lost_way(planar):
 
 def test_a_robot_answers_on_its_port(endpoint, planar):
     with living(endpoint, planar):
-        line = SerialLine(Link(lambda: SerialPort(endpoint.name)))
+        line = SerialLine(Link(lambda: open_port(endpoint.name)))
         try:
             assert line.greet().firmware.startswith("Version 1.2.2")
             cycle = line.cycle(400, -400, True, math.inf)
@@ -168,7 +168,7 @@ def test_the_program_in_the_document(planar, tmp_path, capsys):
 def test_one_host_after_the_other(endpoint, planar):
     with living(endpoint, planar):
         for _ in range(2):
-            line = SerialLine(Link(lambda: SerialPort(endpoint.name)))
+            line = SerialLine(Link(lambda: open_port(endpoint.name)))
             try:
                 line.greet()
             finally:
@@ -178,7 +178,7 @@ def test_one_host_after_the_other(endpoint, planar):
 def test_a_port_vanishes_and_returns(endpoint, planar):
     name = endpoint.name
     with living(endpoint, planar, faults="disconnect@0.5+0.5") as emulator:
-        link = Link(lambda: SerialPort(name))
+        link = Link(lambda: open_port(name))
         try:
             link.resync(time.monotonic() + PATIENCE)
             link.ask(binary.echoed_cycle_packet(300, 300, True))
@@ -198,7 +198,7 @@ def test_a_port_vanishes_and_returns(endpoint, planar):
 
 def test_a_port_that_is_gone(endpoint, planar):
     with living(endpoint, planar, faults="gone@0"):
-        link = Link(lambda: SerialPort(endpoint.name))
+        link = Link(lambda: open_port(endpoint.name))
         try:
             with pytest.raises(LinkLost):
                 link.resync(time.monotonic() + PATIENCE)

@@ -12,6 +12,7 @@ from epuck_mj.bridge.failures import BridgeError, LinkLost, NoReply, RobotRestar
 from epuck_mj.bridge.language import ascii, binary
 from epuck_mj.bridge.language.protocol import RESYNC
 from epuck_mj.bridge.language.replies import Battery, Cycle, Proximity, Steps, Version
+from epuck_mj.bridge.line.connect import open_port
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_port import SerialPort, ports
 from epuck_mj.errors import UserError
@@ -259,7 +260,7 @@ def test_a_pseudo_terminal():
 def test_a_socket():
     with socket.create_server(("127.0.0.1", 0)) as server:
         name = f"socket://127.0.0.1:{server.getsockname()[1]}"
-        link = Link(lambda: SerialPort(name))
+        link = Link(lambda: open_port(name))
         host, _ = server.accept()
         with host:
             host.sendall(BARRIER)
@@ -298,8 +299,19 @@ def test_a_port_is_closed_if_no_guardian_can_be_had(monkeypatch):
         ("/dev/null", "^'/dev/null' is not a serial port$"),
         ("/", "^'/' is not a serial port$"),
         ("", "cannot open port|no port"),
-        ("socket://", "cannot open port"),
-        ("socket://127.0.0.1:99999999", "cannot open port"),
+        ("socket://", "^expected socket://host:port with a port from 1 to 65535"),
+        ("socket://127.0.0.1:99999", "^expected socket://host:port with a port from 1"),
+        ("socket://127.0.0.1:0", "^expected socket://host:port with a port from 1"),
+        ("socket://127.0.0.1:-1", "^expected socket://host:port with a port from 1"),
+        ("socket://127.0.0.1", "^expected socket://host:port with a port from 1"),
+        ("socket://a b:1000", "^expected socket://host:port with a port from 1"),
+        ("socket://me@there:1000", "^expected socket://host:port with a port from 1"),
+        ("tcp://127.0.0.1:99999", r"^expected tcp://host\[:port\] with a port from 1"),
+        ("tcp://127.0.0.1:x", r"^expected tcp://host\[:port\] with a port from 1"),
+        ("tcp://127.0.0.1/1000", r"^expected tcp://host\[:port\] with a port from 1"),
+        ("tcp://[::1", r"^expected tcp://host\[:port\] with a port from 1"),
+        ("tcp://", r"^expected tcp://host\[:port\] with a port from 1"),
+        ("tcp://a..b", "^cannot open port 'tcp://a..b': "),
         ("socket://127.0.0.1:1", "Connection refused"),
         ("nonsense://x", "invalid URL"),
         ("a\0b", "cannot open port"),
@@ -307,7 +319,7 @@ def test_a_port_is_closed_if_no_guardian_can_be_had(monkeypatch):
 )
 def test_ports_that_cannot_be_opened(name, message):
     with pytest.raises(UserError, match=message) as caught:
-        SerialPort(name)
+        open_port(name)
     assert "\n" not in str(caught.value)
 
 

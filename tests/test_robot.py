@@ -22,9 +22,18 @@ from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import Fault, random_scenario, scenario
 from epuck_mj.bridge.language.replies import Cycle, Proximity, Steps, wrapped
 from epuck_mj.bridge.line.interfaces import Greeting
+from epuck_mj.bridge.line.last_resort import stop_at_last
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
-from epuck_mj.constants import SPEED_MAX, TRACK, WHEEL_RADIUS, WHEEL_SPEED_MAX
+from epuck_mj.constants import (
+    CONNECT_TIME_MAX,
+    PURSUIT_TIME,
+    SPEED_MAX,
+    STOP_TIME_MAX,
+    TRACK,
+    WHEEL_RADIUS,
+    WHEEL_SPEED_MAX,
+)
 from epuck_mj.errors import UserError
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
@@ -65,9 +74,7 @@ class World:
         # its banner, and what it does by itself as it starts
         self.time.sleep(3.0)
         self.began = self.time.now
-        self.link = Link(
-            lambda: VirtualPort(self.time), self.time.clock, self.time.sleep
-        )
+        self.link = self.linked()
         self.robot = RealRobot(
             SerialLine(self.link),
             options.pop("calibration", Calibration()),
@@ -78,6 +85,17 @@ class World:
             **options,
         )
         self.session = Session(TASK)
+
+    def linked(self) -> Link:
+        return Link(lambda: VirtualPort(self.time), self.time.clock, self.time.sleep)
+
+    def stopped_at_last(self) -> bool:
+        """Whether the robot confirms that it stopped, after its bridge has ended."""
+        return stop_at_last(
+            lambda: SerialLine(self.linked()),
+            clock=self.time.clock,
+            sleep=self.time.sleep,
+        )
 
     def drive(self, n_steps, policy=None):
         """Greet, drive, stop."""
@@ -444,9 +462,15 @@ def test_a_reset_nobody_heard_of_ends_the_drive(at_wall):
 
 @pytest.mark.parametrize("duration", [0.05, 0.5, 2.0, 4.0])
 def test_a_lost_link_is_stopped_as_soon_as_it_returns(at_wall, duration):
+    """By the bridge, or by the process that it leaves behind."""
     world = at_wall(f"disconnect@1.02+{duration}")
-    with pytest.raises(LinkLost):
+    short = duration < STOP_TIME_MAX
+    with pytest.raises(LinkLost if short else StillMoving):
         world.drive(100)
+    if not short:
+        assert world.time.now - world.began < 1.02 + STOP_TIME_MAX + 0.3
+        assert not world.body.standing
+        assert world.stopped_at_last()
     returned = world.began + 1.02 + duration
     assert world.time.now - returned < 0.5
 
@@ -455,8 +479,10 @@ def test_a_link_lost_for_ever_is_said_so(planar):
     world = World(planar, AT_WALL, faults="gone@1")
     with pytest.raises(StillMoving, match="expected the robot to say that it stopped"):
         world.drive(100)
+    assert world.time.now - world.began < 1 + STOP_TIME_MAX + 0.5
+    assert not world.stopped_at_last()
     assert not world.body.standing
-    assert world.time.now - world.began < 1 + 5 + 0.5
+    assert world.time.now - world.began < 1 + STOP_TIME_MAX + PURSUIT_TIME + 1
 
 
 def test_a_lost_byte_costs_a_resynchronisation(at_wall):
@@ -506,14 +532,17 @@ def test_any_exception_stops_the_robot(at_wall, error):
         raise error
 
 
-def test_a_robot_is_stopped_while_it_calibrates(at_wall):
+def test_nobody_waits_for_a_robot_that_calibrates(at_wall):
+    """It stood when it began, and answers nothing before it has finished."""
     world = at_wall("")
     with pytest.raises(KeyboardInterrupt), world.robot as robot:
         robot.greet()
         world.link.flush()
-        robot._connection._busy_until = world.time.now + 3  # type: ignore
         world.time.send(b"K\r")
+        world.time.sleep(0.1)
+        began = world.time.now
         raise KeyboardInterrupt
+    assert world.time.now - began == pytest.approx(STOP_TIME_MAX, abs=0.1)
 
 
 class Deaf:
@@ -563,6 +592,8 @@ def test_the_first_cause_is_not_lost():
         RealRobot(deaf, Calibration(), 0.1) as robot,
     ):
         robot.greet()
+        robot.begin()
+        robot.step(FULL)
         raise LinkLost("a robot", "nobody")
     assert isinstance(caught.value.__context__, LinkLost)
     assert deaf.closed
@@ -597,9 +628,10 @@ def test_random_faults(planar, seed):
         error = caught
     now = world.time.now
     # bounded: greeting, drive, stop
-    assert now - world.began < 5 + 6 + 3 + 5 + 1
+    assert now - world.began < CONNECT_TIME_MAX + 6 + STOP_TIME_MAX + 1
     kinds = {fault.kind for fault in faults}
-    if isinstance(error, StillMoving):
+    if isinstance(error, StillMoving) and not world.stopped_at_last():
+        now = world.time.now
         # the only way not to stop it is not to reach it
         assert "gone" in kinds
         assert not world.emulator.connected(now)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from epuck_mj.bridge.failures import LinkLost
 from epuck_mj.bridge.fake.emulator import Emulator
-from epuck_mj.bridge.line.serial_port import POLL_TIME
+from epuck_mj.bridge.line.interfaces import POLL_TIME
 from epuck_mj.errors import UserError
 
 TICK = 0.001

@@ -1,5 +1,6 @@
 """A policy drives a real robot: `python -m epuck_mj.bridge CHAMPION --port PORT`."""
 
+import gc
 import math
 import time
 from collections.abc import Sequence
@@ -9,11 +10,14 @@ from typing import Annotated
 
 import tyro
 
+from epuck_mj.bridge.failures import RUNAWAY
 from epuck_mj.bridge.line.connect import connect
+from epuck_mj.bridge.line.last_resort import leave_to_last_resort
 from epuck_mj.bridge.line.serial_port import ports
 from epuck_mj.constants import SPEED_MAX
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse, word
+from epuck_mj.host.output import say
 from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
 from epuck_mj.step.calibration import Calibration
@@ -67,7 +71,7 @@ def bridge(argv: Sequence[str]) -> int:
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     if options.list_ports:
         for name, description in ports():
-            print(f"{name}  {description}")
+            say(f"{name}  {description}")
         return 0
     _refuse_bad_options(options)
     policy, task, robot, arena = _champion(options.champion)
@@ -90,7 +94,12 @@ def bridge(argv: Sequence[str]) -> int:
         calibrate=options.calibrate,
         log=log_name(options.log),
     )
-    return accomplish(mission, lambda: connect(options.port), time.monotonic)
+    # no search for garbage among what was loaded, neither as it drives nor as it ends
+    gc.freeze()
+    status = accomplish(mission, lambda: connect(options.port), time.monotonic)
+    if status == RUNAWAY:
+        leave_to_last_resort(options.port)
+    return status
 
 
 def _refuse_bad_options(options: Options) -> None:

@@ -10,12 +10,14 @@ from typing import Annotated, Literal
 from epuck_mj.bridge.failures import DONE, FAILED, RUNAWAY, BridgeError, StillMoving
 from epuck_mj.bridge.line.connect import connect
 from epuck_mj.bridge.line.interfaces import Connection
+from epuck_mj.bridge.line.last_resort import leave_to_last_resort
 from epuck_mj.calibrate.bench import Bench
 from epuck_mj.calibrate.guide import STEPS, Person
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse, word
 from epuck_mj.host.files import check_writable, is_file
 from epuck_mj.host.interruption import Interrupted, Interruption
+from epuck_mj.host.output import Output, complain, say
 from epuck_mj.step.calibration import Calibration
 
 MODULE = "epuck_mj.calibrate"
@@ -44,7 +46,20 @@ class Options:
     only: Annotated[Literal["straight", "turn", "sensors"] | None, word("STEP")] = None
 
 
-def calibrate(argv: Sequence[str], ask: Callable[[str], str] = input) -> int:
+def answer(question: str) -> str:
+    """What standard input says to a question.
+
+    Raises:
+        EOFError: if it has ended, or there is none.
+        OutputLost: if the question cannot be printed.
+    """
+    say(question, end="")
+    if sys.stdin is None:
+        raise EOFError
+    return input()
+
+
+def calibrate(argv: Sequence[str], ask: Callable[[str], str] = answer) -> int:
     """Run the command line; its exit status.
 
     Args:
@@ -55,7 +70,10 @@ def calibrate(argv: Sequence[str], ask: Callable[[str], str] = input) -> int:
     if not options.port:
         raise UserError("expected --port, as for python -m epuck_mj.bridge")
     steps = tuple(STEPS) if options.only is None else (options.only,)
-    return calibrate_robot(steps, options.output, lambda: connect(options.port), ask)
+    status = calibrate_robot(steps, options.output, lambda: connect(options.port), ask)
+    if status == RUNAWAY:
+        leave_to_last_resort(options.port)
+    return status
 
 
 def calibrate_robot(
@@ -86,14 +104,14 @@ def calibrate_robot(
     with Interruption() as interruption:
         bench = Bench(connect, interruption, clock, sleep)
         person = Person(ask, interruption)
-        print("The robot drives. Ctrl-C stops it and ends.", flush=True)
         try:
+            person.hear("The robot drives. Ctrl-C stops it and ends.")
             # see that the robot answers before a person lays out a floor
             bench.with_robot(known, lambda robot: None)
             for step in steps:
                 known = STEPS[step](bench, person, known)
                 known.save(output)
-                print(f"written: {output}", flush=True)
+                person.hear(f"written: {output}")
         except Interrupted:
             pass
         except StillMoving as error:
@@ -106,8 +124,9 @@ def calibrate_robot(
             word = f"{interruption.signum.name}: ended, the robot stands still"
         if word:
             # a question may stand there unanswered
-            print(flush=True)
-            print(word, file=sys.stderr, flush=True)
+            with Output(sys.stdout) as line:
+                line.say("")
+            complain(word)
     return status
 
 

@@ -28,6 +28,7 @@ from epuck_mj.calibrate.fitting import (
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import Interruption
+from epuck_mj.host.output import say
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.motors import STEP_ANGLE
 
@@ -47,8 +48,12 @@ MISSES = (-360.0, 360.0)
 """Plausible angles by which a turn misses [degrees]."""
 
 
+ANSWERS_MAX = 20
+"""Wrong answers to a question after which nobody is there who reads it. Chosen."""
+
+
 class Person:
-    """Person at the robot; UserError says that the input has ended."""
+    """Person at the robot; UserError says that the input has ended, or is none."""
 
     def __init__(self, ask: Callable[[str], str], interruption: Interruption) -> None:
         """Start without a question asked.
@@ -60,21 +65,31 @@ class Person:
         self._ask = ask
         self._interruption = interruption
 
+    def hear(self, text: str) -> None:
+        """Print something to read; a signal ends that, whoever does not read.
+
+        Raises:
+            OutputLost: if it cannot be printed.
+        """
+        with self._interruption.raising():
+            say(text)
+
     def ready(self, what: str) -> None:
         """Ask for something to be done and wait for Enter."""
         self._answer(f"{what}\nThen press Enter: ")
 
     def agrees(self, question: str) -> bool:
         """Ask until the answer is yes or no; whether it is yes."""
-        while True:
+        for _ in range(ANSWERS_MAX):
             answer = self._answer(f"{question} [y/n]: ").lower()
             if answer in ("y", "yes", "n", "no"):
                 return answer.startswith("y")
-            _say(f"expected y or n, got '{answer}'")
+            self.hear(f"expected y or n, got '{answer}'")
+        raise UserError(f"expected y or n, got {ANSWERS_MAX} other answers")
 
     def number(self, question: str, low: float, high: float) -> float:
         """Ask until the answer is a number within limits; that number."""
-        while True:
+        for _ in range(ANSWERS_MAX):
             answer = self._answer(f"{question}: ")
             try:
                 value = float(answer.replace(",", "."))
@@ -82,7 +97,11 @@ class Person:
                 value = math.nan
             if low <= value <= high:
                 return value
-            _say(f"expected a number from {low:g} to {high:g}, got '{answer}'")
+            self.hear(f"expected a number from {low:g} to {high:g}, got '{answer}'")
+        raise UserError(
+            f"expected a number from {low:g} to {high:g}, "
+            f"got {ANSWERS_MAX} other answers"
+        )
 
     def _answer(self, question: str) -> str:
         try:
@@ -90,7 +109,7 @@ class Person:
                 return self._ask(question).strip()
         except EOFError:
             # the question's line is not ended
-            _say("")
+            self.hear("")
             last = question.splitlines()[-1].strip(": ")
             raise UserError(
                 f"expected an answer to '{last}', got the end of the input"
@@ -102,55 +121,57 @@ def measure_wheel_radii(
 ) -> Calibration:
     """The calibration with wheel radii measured by a ruler."""
     step_length = STEP_ANGLE * known.wheel_radius
-    _say("\nWheel radii: the robot drives straight on, you measure where it gets.")
+    person.hear(
+        "\nWheel radii: the robot drives straight on, you measure where it gets."
+    )
     clear = N_STEPS * step_length + 0.15
     person.ready(
         "Mark where its front is, and a line from there to where it points;\n"
         f"leave {clear:.1f} m clear before it, 0.2 m to each side."
     )
     steps = drive_straight(bench, known)
-    _say(f"It stands. Each wheel made {steps:.0f} steps.")
+    person.hear(f"It stands. Each wheel made {steps:.0f} steps.")
     forward = person.number("How far did its front get, in metres", *LENGTHS)
-    _say("By how many millimetres is its front off the line?")
+    person.hear("By how many millimetres is its front off the line?")
     left = person.number("To the left is above 0, to the right below 0", *DRIFTS)
     radii = fit_wheel_radii(steps, forward, left / 1000, known.track)
-    _say_radii(radii, known)
+    _say_radii(person, radii, known)
     return replace(known, wheel_radii=radii)
 
 
 def measure_track(bench: Bench, person: Person, known: Calibration) -> Calibration:
     """The calibration with the track measured by a protractor."""
-    _say(
+    person.hear(
         f"\nTrack: the robot turns {N_TURNS} times to the left, on the spot;\n"
         "you measure by how much its front misses where it was."
     )
     person.ready("Mark where its front points; leave 5 cm clear around it.")
     steps = turn_on_the_spot(bench, known)
-    _say(f"It stands. Each wheel made {steps:.0f} steps.")
-    _say("By how many degrees does its front miss the mark?")
+    person.hear(f"It stands. Each wheel made {steps:.0f} steps.")
+    person.hear("By how many degrees does its front miss the mark?")
     miss = person.number("Too far is above 0, not far enough is below 0", *MISSES)
     angle = 2 * math.pi * N_TURNS + math.radians(miss)
     mean = known.wheel_radius
     track = fit_track(steps, mean, angle)
-    _say(f"track {1000 * track:.2f} mm; before {1000 * known.track:.2f}")
+    person.hear(f"track {1000 * track:.2f} mm; before {1000 * known.track:.2f}")
     # on the arc that was measured, wheels farther apart differ by more
     wider = track / known.track
     radii = checked_wheel_radii(
         [mean + (radius - mean) * wider for radius in known.wheel_radii]
     )
     if radii != known.wheel_radii:
-        _say_radii(radii, known)
+        _say_radii(person, radii, known)
     return replace(known, track=track, wheel_radii=radii)
 
 
 def measure_gains(bench: Bench, person: Person, known: Calibration) -> Calibration:
     """The calibration with the measured gains of the proximity sensors."""
-    _say("\nSensors: the robot turns slowly on the spot, at several distances")
-    _say("from a flat wall which is 20 cm long or longer.")
+    person.hear("\nSensors: the robot turns slowly on the spot, at several distances")
+    person.hear("from a flat wall which is 20 cm long or longer.")
     if person.agrees("Set the sensors' zero? They forget it when switched off"):
         person.ready("Leave 20 cm clear around it.")
         zero(bench, known)
-        _say("The zero is set.")
+        person.hear("The zero is set.")
     rows = []
     for clearance in CLEARANCES:
         person.ready(
@@ -158,10 +179,10 @@ def measure_gains(bench: Bench, person: Person, known: Calibration) -> Calibrati
             "wall;\ntake the spacer away, leave 20 cm clear elsewhere."
         )
         rows.append(peaks(*look_around(bench, known)))
-        _say("It stands.")
+        person.hear("It stands.")
     counts = np.array(rows)
     fit = fit_gains(np.array(CLEARANCES), counts)
-    _say(table(counts, fit))
+    person.hear(table(counts, fit))
     return replace(known, proximity_gains=tuple(map(float, fit.gains)))
 
 
@@ -194,13 +215,11 @@ def table(counts: np.ndarray, fit: SensorFit) -> str:
     return "\n".join(lines)
 
 
-def _say_radii(radii: tuple[float, ...], known: Calibration) -> None:
+def _say_radii(person: Person, radii: tuple[float, ...], known: Calibration) -> None:
     for name, radius, before in zip(SIDES, radii, known.wheel_radii, strict=True):
-        _say(f"{name} wheel radius {1000 * radius:.2f} mm; before {1000 * before:.2f}")
-
-
-def _say(text: str) -> None:
-    print(text, flush=True)
+        person.hear(
+            f"{name} wheel radius {1000 * radius:.2f} mm; before {1000 * before:.2f}"
+        )
 
 
 STEPS = {

@@ -13,6 +13,12 @@ from typing import Any, TypeVar
 import tyro
 
 from epuck_mj.errors import UserError
+from epuck_mj.host.output import (
+    OUTPUT_LOST,
+    OutputLost,
+    complain,
+    occupy_standard_streams,
+)
 
 Options = TypeVar("Options")
 
@@ -120,10 +126,14 @@ def main(run: Callable[[Sequence[str]], int]) -> None:
 
     `run` may raise `UserError` for anything that the user can put right.
     """
+    occupy_standard_streams()
     try:
         status = run(sys.argv[1:])
+    except OutputLost as error:
+        complain(f"error: {error}")
+        status = OUTPUT_LOST
     except UserError as error:
-        print(f"error: {error}", file=sys.stderr)
+        complain(f"error: {error}")
         status = 2
     except KeyboardInterrupt:
         status = 130

@@ -18,6 +18,9 @@ except ImportError:
 
 STOP_KEYS = b"q "
 
+KEYS_MAX = 4096
+"""Largest number of keys read at once, which is all that a terminal keeps."""
+
 
 class Keyboard:
     """Keys of a terminal, or no keys without a terminal."""
@@ -32,18 +35,14 @@ class Keyboard:
         return self._handle is not None
 
     def stop_wanted(self) -> bool:
-        """Whether a stop key was pressed since the last call; does not wait."""
-        if self._handle is None:
+        """Whether a stop key is among the latest keys; does not wait."""
+        if self._handle is None or not select.select([self._handle], [], [], 0)[0]:
             return False
-        wanted = False
-        while select.select([self._handle], [], [], 0)[0]:
-            keys = _read(self._handle)
-            if not keys:
-                # the terminal has gone
-                self._handle = None
-                break
-            wanted |= any(key in keys for key in STOP_KEYS)
-        return wanted
+        keys = _read(self._handle)
+        if not keys:
+            # the terminal has gone
+            self._handle = None
+        return any(key in keys for key in STOP_KEYS)
 
 
 @contextmanager
@@ -55,14 +54,15 @@ def keyboard() -> Iterator[Keyboard]:
     handle = sys.stdin.fileno()
     before = termios.tcgetattr(handle)
     try:
-        tty.setcbreak(handle)
+        # at once: a terminal that is stopped (Ctrl-S) never takes what it was sent
+        tty.setcbreak(handle, termios.TCSANOW)
         yield Keyboard(handle)
     finally:
-        termios.tcsetattr(handle, termios.TCSADRAIN, before)
+        termios.tcsetattr(handle, termios.TCSANOW, before)
 
 
 def _read(handle: int) -> bytes:
     try:
-        return os.read(handle, 64)
+        return os.read(handle, KEYS_MAX)
     except OSError:
         return b""

@@ -1,5 +1,6 @@
 """One drive of a real robot, from the greeting to the log."""
 
+import contextlib
 import sys
 import time
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from epuck_mj.bridge.failures import DONE, FAILED, RUNAWAY, BridgeError, StillMo
 from epuck_mj.bridge.line.interfaces import Connection
 from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import Interrupted, Interruption
+from epuck_mj.host.output import OUTPUT_LOST, Output, OutputLost, complain
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import Policy, TaskParameters
@@ -68,7 +70,11 @@ def accomplish(
         UserError: if it never began.
     """
     session = Session(mission.task)
-    with Interruption() as interruption, keyboard() as keys:
+    with (
+        Output(sys.stdout) as output,
+        Interruption() as interruption,
+        keyboard() as keys,
+    ):
         robot, status, word = None, DONE, ""
         try:
             with interruption.raising():
@@ -84,7 +90,9 @@ def accomplish(
             )
             # however the inner block ends, the outer one stops the robot
             with robot, interruption.raising():
-                word = _drive(mission, robot, session, keys, clock)
+                word = _drive(
+                    mission, robot, session, output, keys, clock, interruption
+                )
         except Interrupted:
             word = "interrupted"
         except StillMoving as error:
@@ -93,22 +101,27 @@ def accomplish(
             if session.start is None:
                 raise
             status, word = FAILED, f"error: {error}; the robot stands still"
+        except OutputLost as error:
+            status, word = OUTPUT_LOST, f"error: {error}; the robot stands still"
         finally:
             facts, failure = _save(mission, session, robot)
         if interruption.signum is not None and status != RUNAWAY:
             status = interruption.status
             still = "the robot stands still" if robot and robot.met else "never began"
             word = f"{interruption.signum.name}: ended, {still}"
-        # stdout may be closed, so errors go to stderr first
+        # stdout may be lost, so errors go to stderr first
         if status:
-            print(word, file=sys.stderr, flush=True)
-        print(facts, flush=True)
-        if not status:
-            print(word, flush=True)
+            complain(word)
+        try:
+            output.say(facts if status else f"{facts}\n{word}")
+            output.finish()
+        except OutputLost:
+            if not status:
+                raise
     if failure is not None and not status:
         raise failure
     if failure is not None:
-        print(f"error: {failure}", file=sys.stderr)
+        complain(f"error: {failure}")
     return status
 
 
@@ -116,19 +129,22 @@ def _drive(
     mission: Mission,
     robot: RealRobot,
     session: Session,
+    output: Output,
     keys: Keyboard,
     clock: Callable[[], float],
+    interruption: Interruption,
 ) -> str:
     """Drive the robot; why the drive ended as planned."""
     greeting = robot.greet()
-    print(f"{greeting.firmware}; battery {greeting.battery}", flush=True)
+    output.say(f"{greeting.firmware}; battery {greeting.battery}")
     if mission.calibrate:
-        print("calibration: keep 20 cm around the robot clear of everything")
-        print("it takes up to 3 seconds ...", flush=True)
+        output.say("calibration: keep 20 cm around the robot clear of everything")
+        output.say("it takes up to 3 seconds ...")
         robot.calibrate()
-        print("calibrated", flush=True)
-    print(f"{'DRY RUN, it stands still. ' if mission.dry_run else ''}", end="")
-    print(f"{'q or space stops. ' if keys.there else ''}Ctrl-C stops.\n{HEADING}")
+        output.say("calibrated")
+    dry = "DRY RUN, it stands still. " if mission.dry_run else ""
+    stops = "q or space stops. " if keys.there else ""
+    output.say(f"{dry}{stops}Ctrl-C stops.\n{HEADING}")
     live = sys.stdout.isatty()
     every = 1 if live else max(1, round(QUIET_PERIOD / mission.task.control_step))
     try:
@@ -136,12 +152,16 @@ def _drive(
             if step.number % every == 0:
                 line = live_line(step, robot)
                 start, end = ("\r", "") if live else ("", "\n")
-                print(f"{start}{line}", end=end, flush=True)
+                output.say(f"{start}{line}", end)
+            # it may have come where python cannot raise anything
+            if interruption.signum is not None:
+                raise Interrupted
             if keys.stop_wanted():
                 return "stopped by the operator's key; the robot stands still"
     finally:
         if live:
-            print(flush=True)
+            with contextlib.suppress(OutputLost):
+                output.say("")
     return "ended; the robot stands still"
 
 

@@ -9,7 +9,13 @@ import numpy as np
 
 from epuck_mj.bridge.drive.odometry import Odometry
 from epuck_mj.bridge.drive.schedule import Schedule
-from epuck_mj.bridge.failures import BridgeError, LinkLost, RobotRestarted, StaleReading
+from epuck_mj.bridge.failures import (
+    BridgeError,
+    LinkLost,
+    RobotRestarted,
+    StaleReading,
+    StillMoving,
+)
 from epuck_mj.bridge.line.interfaces import Connection, Greeting
 from epuck_mj.constants import READING_AGE_MAX
 from epuck_mj.step.calibration import Calibration
@@ -84,6 +90,7 @@ class RealRobot:
         self._clock = clock
         self.met = False
         self._rates = (0, 0)
+        self._driven = False
         self._fresh_until = float("inf")
         self._origin = clock()
         self.schedule = Schedule(control_step, clock, sleep)
@@ -111,11 +118,15 @@ class RealRobot:
         """Stop the robot, if it ever answered.
 
         Raises:
-            StillMoving: if it does not say that it stopped.
+            StillMoving: if it was driven and does not say that it stopped.
         """
         try:
             if self.met:
                 self._connection.stop()
+        except StillMoving:
+            # it stood when it was met, and was told nothing else since
+            if self._driven:
+                raise
         finally:
             self._connection.close()
 
@@ -186,6 +197,7 @@ class RealRobot:
             age = asked - self._fresh_until + READING_AGE_MAX
             raise _stale(f"none for {age * 1000:.0f} ms: this computer was busy")
         until = min(self._fresh_until, asked + READING_AGE_MAX)
+        self._driven |= any(rates)
         try:
             cycle = self._connection.cycle(*rates, changed, until)
         except (LinkLost, RobotRestarted):

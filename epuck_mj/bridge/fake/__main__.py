@@ -16,6 +16,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse, word
 from epuck_mj.host.files import check_writable
 from epuck_mj.host.interruption import Interrupted, Interruption
+from epuck_mj.host.output import Output
 
 MODULE = "epuck_mj.bridge.fake"
 RANDOM = "random"
@@ -91,24 +92,27 @@ def fake(argv: Sequence[str]) -> int:
     robot = options.firmware if options.wifi is None else WIFI
     tcp = options.tcp if options.wifi is None else options.wifi
     emulator = Emulator(body, robot, clock(), faults, options.latency, options.seed)
-    with Interruption() as interruption, tempfile.TemporaryDirectory() as folder:
-        link = options.link or Path(folder, "e-puck")
-        endpoint = Pty(link) if tcp is None else Tcp(tcp)
-        try:
-            with interruption.raising():
-                if faults:
-                    print(f"scenario: {','.join(map(str, faults))}")
-                print(f"port: {endpoint.name}", flush=True)
-                serve(emulator, endpoint, clock, lambda: True)
-        except Interrupted:
-            pass
-        finally:
-            endpoint.close()
-    if options.journal is not None:
-        body.journal.save(options.journal, scene.model.opt.timestep)
-    state = "standing" if body.standing else "still driving"
-    x, y, yaw = body.pose
-    print(f"{state}, x {x:.4f} m, y {y:.4f} m, yaw {math.degrees(yaw):.2f} degrees")
+    with Output(sys.stdout) as output:
+        with Interruption() as interruption, tempfile.TemporaryDirectory() as folder:
+            link = options.link or Path(folder, "e-puck")
+            endpoint = Pty(link) if tcp is None else Tcp(tcp)
+            try:
+                with interruption.raising():
+                    if faults:
+                        output.say(f"scenario: {','.join(map(str, faults))}")
+                    output.say(f"port: {endpoint.name}")
+                    serve(emulator, endpoint, clock, lambda: not output.lost)
+            except Interrupted:
+                pass
+            finally:
+                endpoint.close()
+        if options.journal is not None:
+            body.journal.save(options.journal, scene.model.opt.timestep)
+        state = "standing" if body.standing else "still driving"
+        x, y, yaw = body.pose
+        turned = f"yaw {math.degrees(yaw):.2f} degrees"
+        output.say(f"{state}, x {x:.4f} m, y {y:.4f} m, {turned}")
+        output.finish()
     return 0
 
 

@@ -22,7 +22,7 @@ N_FAREWELLS, FAREWELL_PERIOD = 5, 0.2
 DISMISSED = b"."
 """Message of a bridge that needs no guardian any more."""
 
-DISMISSAL_TIME_MAX = 2.0
+DISMISSAL_TIME_MAX = 0.2
 """Time after which a dismissed guardian is killed [s]. Chosen."""
 
 

@@ -5,6 +5,18 @@ from typing import Protocol
 
 from epuck_mj.bridge.language.replies import Cycle
 
+POLL_TIME = 0.01
+"""How long one read of a port waits for its first byte [s]."""
+
+WRITE_TIME_MAX = 0.2
+"""Time without accepting bytes after which a port is lost [s]. Chosen.
+
+A robot that cannot be told anything for longer can be stopped only on a new port.
+"""
+
+READ_MAX = 4096
+"""Largest number of bytes read at once."""
+
 
 class Port(Protocol):
     """A port that sends and receives bytes."""

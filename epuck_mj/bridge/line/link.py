@@ -13,6 +13,7 @@ from epuck_mj.bridge.language.parsing import Request, T
 from epuck_mj.bridge.language.protocol import RESYNC, greets
 from epuck_mj.bridge.line.interfaces import Port
 from epuck_mj.bridge.line.losable_port import LosablePort
+from epuck_mj.constants import NOISE_TIME_MAX
 from epuck_mj.errors import UserError
 
 REOPEN_PERIOD = 0.1
@@ -75,7 +76,7 @@ class Link:
         self.in_step, self._rest, self._unanswered = False, b"", False
         while True:
             try:
-                self._port.reopen()
+                self._port.reopen(max(until - self.clock(), REOPEN_PERIOD))
                 return
             except UserError as error:
                 if self.clock() >= until:
@@ -108,6 +109,25 @@ class Link:
             raise RobotRestarted(f"silence before {request.name}", stale)
         if stale and binary:
             raise BridgeError(f"silence before {request.name}", stale)
+        return self._exchange(request, until)
+
+    def order(self, request: Request[T], until: float) -> T:
+        """Send a request in ASCII whatever was heard and however it is; its reply.
+
+        Args:
+            request: what to ask.
+            until: see `ask`.
+
+        Raises:
+            BridgeError: see `ask`.
+        """
+        self.flush()
+        self.in_step = False
+        return self._exchange(request, until)
+
+    def _exchange(self, request: Request[T], until: float) -> T:
+        """Send a request; its reply, with which the link is in step."""
+        binary = request.out.endswith(b"\0")
         self._rest = b""
         parser = request.parser()
         deadline = min(self.clock() + request.patience, until)
@@ -116,7 +136,7 @@ class Link:
             data = self._port.receive(deadline - now)
             if not data:
                 continue
-            self._rest += data
+            self._rest = (self._rest + data)[-DROPPED_MAX:]
             reply = parser.feed(data)
             if reply is not None:
                 self._rest = parser.rest
@@ -131,7 +151,8 @@ class Link:
         """Synchronise with the robot; requests that it had received are carried out.
 
         Args:
-            until: when to give up, by the clock.
+            until: when to give up, by the clock. Something that is no answer shortens
+                that to NOISE_TIME_MAX: who talks, but not as an e-puck, is none.
 
         Returns:
             Whether the robot's banner came: it was reset.
@@ -143,9 +164,12 @@ class Link:
         restarted, came = False, b""
         while True:
             self.in_step = False
+            noisy_until = min(until, self.clock() + NOISE_TIME_MAX)
             self._port.send(RESYNC.flush)
-            dropped = self._rest + self.drain(until)
+            dropped = self._rest + self.drain(noisy_until)
             self._rest = b""
+            if dropped:
+                until = noisy_until
             restarted |= greets(dropped)
             came = dropped or came
             if self.clock() >= until:

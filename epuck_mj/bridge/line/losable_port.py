@@ -1,9 +1,16 @@
-"""Ports that may be lost at any time and opened again."""
+"""Ports that may be lost at any time and opened again, and never keep one waiting."""
 
+import contextlib
 from collections.abc import Callable
 
 from epuck_mj.bridge.failures import LinkLost
+from epuck_mj.bridge.line.in_time import in_time
 from epuck_mj.bridge.line.interfaces import Port
+from epuck_mj.constants import CONNECT_TIME_MAX
+from epuck_mj.errors import UserError
+
+CLOSE_TIME_MAX = 0.3
+"""Time after which a port that does not close is left to the system [s]. Chosen."""
 
 
 class LosablePort:
@@ -13,24 +20,33 @@ class LosablePort:
         """Open the port by `open_port`, which `reopen` calls again.
 
         Raises:
-            UserError: if that is not possible.
+            UserError: if that is not possible, or not in CONNECT_TIME_MAX.
         """
         self._open_port = open_port
-        self._port: Port | None = open_port()
+        self._port: Port | None = None
+        self.reopen(CONNECT_TIME_MAX)
 
     @property
     def lost(self) -> bool:
         """Whether the port has to be opened again."""
         return self._port is None
 
-    def reopen(self) -> None:
+    def reopen(self, seconds: float) -> None:
         """Close what is left of the lost port and open it again.
+
+        Args:
+            seconds: how long that may take.
 
         Raises:
             UserError: if that is not possible.
         """
         self.close()
-        self._port = self._open_port()
+        try:
+            self._port = in_time(self._open_port, seconds, late=_close)
+        except TimeoutError:
+            raise UserError(
+                f"expected a port that opens in {seconds:.1f} s, got none"
+            ) from None
 
     def send(self, data: bytes) -> None:
         """See Port."""
@@ -49,12 +65,17 @@ class LosablePort:
             raise
 
     def close(self) -> None:
-        """See Port."""
-        if self._port is not None:
-            self._port.close()
-            self._port = None
+        """See Port; what takes too long goes on without us."""
+        port, self._port = self._port, None
+        if port is not None:
+            with contextlib.suppress(TimeoutError):
+                in_time(port.close, CLOSE_TIME_MAX)
 
     def _opened(self) -> Port:
         if self._port is None:
             raise LinkLost("an open port", "one that was lost")
         return self._port
+
+
+def _close(port: Port) -> None:
+    port.close()

@@ -18,16 +18,14 @@ class SerialLine:
     def __init__(self, link: Link) -> None:
         """Use an open link."""
         self._link = link
-        self._busy_until = 0.0
         self.n_repairs = 0
 
     def greet(self) -> Greeting:
         """See Connection."""
         until = self._link.clock() + CONNECT_TIME_MAX
         # whatever it did before we came: first it stands still
-        self._link.flush()
         try:
-            self._link.ask(ascii.stop_order(), self._link.clock() + STOP_REPLY_TIME)
+            self._link.order(ascii.stop_order(), self._link.clock() + STOP_REPLY_TIME)
         except LinkLost:
             raise
         except BridgeError:
@@ -75,24 +73,22 @@ class SerialLine:
 
     def calibrate(self) -> None:
         """See Connection."""
-        request = ascii.calibration_order()
-        self._busy_until = self._link.clock() + request.patience
-        self._link.ask(request)
-        self._busy_until = 0.0
+        self._link.ask(ascii.calibration_order())
 
     def stop(self) -> None:
         """See Connection."""
-        now = self._link.clock()
-        # while it calibrates it handles no commands
-        until = max(now, self._busy_until) + STOP_TIME_MAX
+        until = again = self._link.clock() + STOP_TIME_MAX
         problem: BridgeError | None = None
         while problem is None or self._link.clock() < until:
             try:
                 if self._link.lost:
                     self._link.reopen(until)
+                elif problem is not None:
+                    # who babbles is not told without a pause
+                    self._link.drain(again)
+                again = min(self._link.clock() + STOP_REPLY_TIME, until)
                 # at once, instead of waiting for silence as a resync does
-                self._link.flush()
-                self._link.ask(ascii.stop_order(), self._link.clock() + STOP_REPLY_TIME)
+                self._link.order(ascii.stop_order(), again)
                 return
             except BridgeError as error:
                 problem = error

@@ -1,5 +1,6 @@
 """Ports of pyserial, which may fail at any time."""
 
+import contextlib
 import errno
 
 import serial
@@ -7,21 +8,13 @@ from serial.tools import list_ports
 
 from epuck_mj.bridge.failures import LinkLost
 from epuck_mj.bridge.line import guardian
+from epuck_mj.bridge.line.interfaces import POLL_TIME, READ_MAX, WRITE_TIME_MAX
 from epuck_mj.constants import BAUD_RATE
 from epuck_mj.errors import UserError
 
-POLL_TIME = 0.01
-"""How long one read of a port waits for its first byte [s]."""
-
-WRITE_TIME_MAX = 0.5
-"""Time without accepting bytes after which a port is lost [s]. Chosen."""
-
-READ_MAX = 4096
-"""Largest number of bytes read at once."""
-
 
 class SerialPort:
-    """A port of pyserial: `/dev/rfcomm0`, `COM5` or `socket://host:port`."""
+    """A port of pyserial: `/dev/rfcomm0` or `COM5`."""
 
     def __init__(self, name: str, farewell: bytes = b"") -> None:
         """Open the port for this process only.
@@ -43,7 +36,8 @@ class SerialPort:
                 write_timeout=WRITE_TIME_MAX,
                 exclusive=True,
             )
-        except (OSError, ValueError, TypeError) as error:
+        # termios has an exception of its own, of no other kind
+        except Exception as error:
             raise UserError(_why(name, error)) from None
         self._guardian = None
         try:
@@ -64,11 +58,8 @@ class SerialPort:
         try:
             # pyserial waits for as many bytes as one asks for
             data = self._serial.read(1) if timeout > 0 else b""
-            if self._serial.in_waiting:
-                # and of a socket it does not know how many there are
-                self._serial.timeout = 0
-                data += self._serial.read(READ_MAX)
-                self._serial.timeout = POLL_TIME
+            if n_waiting := self._serial.in_waiting:
+                data += self._serial.read(min(n_waiting, READ_MAX))
         except (OSError, TypeError, ValueError) as error:
             raise self._lost(error) from None
         return bytes(data)
@@ -76,15 +67,8 @@ class SerialPort:
     def close(self) -> None:
         """See Port."""
         guardian.dismiss(self._guardian)
-        # pyserial forgets to close the socket of a peer that has gone
-        socket = getattr(self._serial, "_socket", None)
-        try:
+        with contextlib.suppress(OSError):
             self._serial.close()
-        except OSError:
-            pass
-        finally:
-            if socket is not None:
-                socket.close()
 
     def _lost(self, error: Exception) -> LinkLost:
         return LinkLost(f"a robot at '{self.name}'", f"'{_one_line(error)}'")

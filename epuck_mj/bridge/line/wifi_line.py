@@ -15,6 +15,7 @@ from epuck_mj.bridge.line.losable_port import LosablePort
 from epuck_mj.constants import (
     CALIBRATION_TIME_MAX,
     CONNECT_TIME_MAX,
+    NOISE_TIME_MAX,
     STOP_REPLY_TIME,
     STOP_TIME_MAX,
     WIFI_PERIOD,
@@ -76,7 +77,7 @@ class WifiLine:
         """
         if changed:
             self._port.send(wifi_command(left, right))
-        self._drop()
+        self._drop(until)
         sensors = self._next(until)
         return Cycle(sensors.proximity, sensors.steps)
 
@@ -95,9 +96,9 @@ class WifiLine:
         while self._clock() < until:
             try:
                 if self._port.lost:
-                    self._port.reopen()
+                    self._port.reopen(until - self._clock())
                     self._parser = PacketParser()
-                if self._rests():
+                if self._rests(until):
                     return
                 problem = NoReply("step counters at rest", "others all the time")
             except UserError as error:
@@ -110,30 +111,45 @@ class WifiLine:
         """See Connection."""
         self._port.close()
 
-    def _rests(self) -> bool:
-        """Whether the robot stands still after it was told to."""
+    def _rests(self, until: float) -> bool:
+        """Whether the robot stands still after it was told to, seen in time."""
         self._port.send(wifi_command(0, 0))
-        self._drop()
+        self._drop(until)
         # commands wait for their turn: what it does now says nothing yet
-        self._next(self._clock() + STOP_REPLY_TIME)
+        self._next(min(self._clock() + STOP_REPLY_TIME, until))
         began = self._clock()
         first: Steps | None = None
         while self._clock() < began + STANDING_TIME:
-            steps = self._next(self._clock() + STOP_REPLY_TIME).steps
+            steps = self._next(min(self._clock() + STOP_REPLY_TIME, until)).steps
             if first is not None and steps != first:
                 return False
             first = steps
         return True
 
-    def _drop(self) -> None:
-        """Drop the packets that have come, but keep incomplete ones."""
+    def _drop(self, until: float) -> None:
+        """Drop the packets that have come, but keep incomplete ones.
+
+        Raises:
+            BridgeError: if there are still more of them in the end.
+        """
         while data := self._port.receive(0.0):
             self._parser.feed(data)
+            if self._clock() >= until:
+                raise NoReply("the latest packet in time", "older ones without an end")
 
     def _next(self, until: float) -> Sensors:
-        """Wait for packets; the latest of them."""
+        """Wait for packets; the latest of them.
+
+        Raises:
+            BridgeError: if none comes, or only others for NOISE_TIME_MAX.
+        """
+        came = b""
         while (now := self._clock()) < until:
-            found = self._parser.feed(self._port.receive(until - now))
+            data = self._port.receive(until - now)
+            if data and not came:
+                until = min(until, now + NOISE_TIME_MAX)
+            came = data or came
+            found = self._parser.feed(data)
             if found:
                 return found[-1]
-        raise NoReply("a packet of an e-puck2 in time", "nothing")
+        raise NoReply("a packet of an e-puck2 in time", came or "nothing")
