@@ -30,11 +30,13 @@ from evolution.run.champion import (
     most_believed,
 )
 from evolution.run.directory import RunDirectory
-from evolution.run.generation_loop import Evolution, Record
+from evolution.run.generation_loop import Evolution
+from evolution.run.history import Record
 from evolution.run.results import write_results
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from evolution.settings.randomness import Purpose
+from tests.no_pictures import draw_nothing
 
 SHIPPED = ("de-best", "de-rand", "ga")
 
@@ -225,8 +227,7 @@ def written(tmp_path_factory):
     experiment = Evolution(tiny("de-best", steps=20), threads=1)
     list(experiment.run())
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(results, "_draw_fitness", lambda *_: None)
-        patch.setattr(results, "_show", lambda *_: None)
+        draw_nothing(patch)
         write_results(experiment, judges_of(experiment.config), directory, threads=1)
     return experiment, directory
 
@@ -340,8 +341,7 @@ def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
 def test_a_run_on_the_wheeled_robot_is_tested_on_the_plane_as_well(
     tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(results, "_draw_fitness", lambda *_: None)
-    monkeypatch.setattr(results, "_show", lambda *_: None)
+    draw_nothing(monkeypatch)
     experiment = Evolution(tiny("ga", robot="epuck", steps=10, evaluations=20))
     list(experiment.run())
     directory = RunDirectory(tmp_path)

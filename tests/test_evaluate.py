@@ -15,13 +15,13 @@ from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.calibration import Calibration
 from evolution.evaluate import evaluate_policies
 from evolution.judging.held_out import Judge, Judges
-from evolution.run import results
 from evolution.run.directory import RunDirectory
 from evolution.run.execution import Run
 from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from evolution.verify import verify
+from tests.no_pictures import draw_nothing
 
 
 @pytest.fixture(scope="module")
@@ -36,8 +36,7 @@ def finished(tmp_path_factory) -> Path:
     run.start()
     assert len(list(run.evolve())) == 2
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(results, "_draw_fitness", lambda *_: None)
-        patch.setattr(results, "_show", lambda *_: None)
+        draw_nothing(patch)
         run.finish()
     return path
 

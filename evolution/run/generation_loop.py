@@ -5,7 +5,7 @@ result. Randomness is keyed by what it is for: `random_generator(seed, purpose, 
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.disturbances import Disturbances
 from evolution.judging.evaluation import BatchEngine, DmControlEngine, Engine, evaluate
+from evolution.run.history import Record, history_text
 from evolution.search.table import Optimizer, make_optimizer
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.randomness import Purpose, disturbances, random_generator
@@ -21,35 +22,8 @@ from evolution.settings.randomness import Purpose, disturbances, random_generato
 ENGINES = ("batch", "dm_control")
 
 
-@dataclass(frozen=True)
-class Record:
-    """Record of one generation: fitness, then cost.
-
-    Attributes:
-        generation: counted from 0, the initial population.
-        evaluations: individuals evaluated so far.
-        best: highest stored fitness of the population.
-        mean: mean stored fitness of the population.
-        std: its standard deviation.
-        control_steps: of all its trials together; racing makes them fewer.
-        crash_rate: share of its trials that ended in a crash; racing breaks some off
-            before they can.
-    """
-
-    generation: int
-    evaluations: int
-    best: float
-    mean: float
-    std: float
-    control_steps: int
-    crash_rate: float
-
-
 ARRAYS = {"records": len(Record.__dataclass_fields__), "best_genomes": None}
 """Arrays of a state, one row per generation, and their columns (None: genes)."""
-
-HISTORY: tuple[str, ...] = ("generation", "evaluations", "best", "mean", "std")
-"""Columns of history.csv: racing changes none of them."""
 
 
 class Evolution:
@@ -193,12 +167,8 @@ class Evolution:
         return array
 
     def history(self) -> str:
-        """Text of history.csv, without times, with floats that read back exactly."""
-        rows = [
-            ",".join(repr(getattr(record, name)) for name in HISTORY)
-            for record in self.records
-        ]
-        return "\n".join([",".join(HISTORY), *rows]) + "\n"
+        """Text of history.csv."""
+        return history_text(self.records)
 
 
 def _optimizer(config: ExperimentConfig) -> Optimizer:

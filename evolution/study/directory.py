@@ -5,8 +5,14 @@ from pathlib import Path
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from evolution.run.directory import LOCK, RunDirectory, locked
-from evolution.study.config import StudyConfig, seeds_from_yaml, seeds_to_yaml
+from evolution.run.directory import RunDirectory
+from evolution.run.lock import LOCK, locked
+from evolution.study.config import (
+    SEEDS_OF_STUDY_MAX,
+    StudyConfig,
+    seeds_from_yaml,
+    seeds_to_yaml,
+)
 
 PREFIX = "seed-"
 
@@ -86,6 +92,11 @@ class StudyDirectory:
                     asked = {n: there for n in begun if (there := self.seeds(n))}
                 for name in config.experiments:
                     asked[name] = sorted({*asked.get(name, ()), *seeds})
+                    if len(asked[name]) > SEEDS_OF_STUDY_MAX:
+                        raise UserError(
+                            f"expected at most {SEEDS_OF_STUDY_MAX} seeds in "
+                            f"'{self.path}', got {len(asked[name])} of {name}"
+                        )
                 if files.is_file(self.config):
                     config = self.stored_config().merged(config, self.path)
                 files.write_text(self.config, config.to_yaml())

@@ -1,0 +1,116 @@
+"""Histories of a run: history.csv, best_individuals.npz and timing.csv."""
+
+import csv
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from epuck_mj.errors import UserError
+from epuck_mj.host import files
+
+
+@dataclass(frozen=True)
+class Record:
+    """Record of one generation: fitness, then cost.
+
+    Attributes:
+        generation: counted from 0, the initial population.
+        evaluations: individuals evaluated so far.
+        best: highest stored fitness of the population.
+        mean: mean stored fitness of the population.
+        std: its standard deviation.
+        control_steps: of all its trials together; racing makes them fewer.
+        crash_rate: share of its trials that ended in a crash; racing breaks some off
+            before they can.
+    """
+
+    generation: int
+    evaluations: int
+    best: float
+    mean: float
+    std: float
+    control_steps: int
+    crash_rate: float
+
+
+HISTORY: tuple[str, ...] = ("generation", "evaluations", "best", "mean", "std")
+"""Columns of history.csv: racing changes none of them."""
+
+
+def history_text(records: Sequence[Record]) -> str:
+    """Text of history.csv, without times, with floats that read back exactly."""
+    rows = [
+        ",".join(repr(getattr(record, name)) for name in HISTORY) for record in records
+    ]
+    return "\n".join([",".join(HISTORY), *rows]) + "\n"
+
+
+def read_history(path: Path) -> dict[str, np.ndarray]:
+    """The columns of a history.csv, `(generations,)` each.
+
+    Raises:
+        UserError: if it cannot be read, or is damaged.
+    """
+    text = files.read_text(path)
+    try:
+        header, *lines = text.splitlines() or [""]
+        rows = np.array([[float(x) for x in line.split(",")] for line in lines])
+        if header != ",".join(HISTORY) or rows.ndim != 2 or not len(rows):
+            raise ValueError(f"expected rows of {','.join(HISTORY)}")
+        columns = dict(zip(HISTORY, rows.T, strict=True))
+        spent = np.diff(columns["evaluations"], prepend=0)
+        if (spent <= 0).any() or not np.isfinite(rows).all():
+            raise ValueError("evaluations do not rise, or a value is not finite")
+    except ValueError as error:
+        raise UserError(f"'{path}' is damaged: {error}") from None
+    return columns
+
+
+def read_best_individuals(path: Path, n_genes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Genomes `(generations, n_genes)` and fitness `(generations,)` of the best.
+
+    Raises:
+        UserError: if they cannot be read, or are something else.
+    """
+    best = files.read_arrays(path)
+    genomes, fitness = (best.get(name, np.empty(0)) for name in ("genomes", "fitness"))
+    n = fitness.size
+    if not n or fitness.shape != (n,) or genomes.shape != (n, n_genes):
+        raise UserError(
+            f"'{path}': expected genomes (generations, {n_genes}) and fitness "
+            f"(generations,), got {genomes.shape} and {fitness.shape}"
+        )
+    for array in (genomes, fitness):
+        if array.dtype != float or not np.isfinite(array).all():
+            raise UserError(f"'{path}': expected finite numbers")
+    return genomes, fitness
+
+
+def timing_text(
+    records: Sequence[Record], seconds: Sequence[float], before: Path
+) -> str:
+    """Text of timing.csv; seconds are empty where a kill lost them.
+
+    Args:
+        records: of all generations.
+        seconds: that each of the last generations took.
+        before: the file so far, which knows the others' seconds.
+    """
+    taken: dict[int, str] = {}
+    if files.is_file(before):
+        text = before.read_text(encoding="utf-8", errors="replace")
+        for row in csv.DictReader(text.splitlines()):
+            # a row that was cut off says nothing
+            with suppress(KeyError, TypeError, ValueError):
+                taken[int(row["generation"])] = f"{float(row['seconds']):.3f}"
+    first = len(records) - len(seconds)
+    taken |= {first + i: f"{each:.3f}" for i, each in enumerate(seconds)}
+    lines = [
+        f"{record.generation},{taken.get(record.generation, '')},"
+        f"{record.control_steps},{record.crash_rate:.4f}\n"
+        for record in records
+    ]
+    return "".join(["generation,seconds,control_steps,crash_rate\n", *lines])
