@@ -39,39 +39,67 @@ class Champion:
     validation_fitness: float
 
 
-def candidates(evolution: Evolution) -> tuple[np.ndarray, np.ndarray]:
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """What a run stored of its individuals.
+
+    Attributes:
+        population: genomes of the final population, `(n, genes)`.
+        fitness: of the final population, `(n,)`.
+        best_genomes: the best individual of each generation, `(generations, genes)`.
+        best: its fitness, `(generations,)`.
+    """
+
+    population: np.ndarray
+    fitness: np.ndarray
+    best_genomes: np.ndarray
+    best: np.ndarray
+
+
+def stored_by(evolution: Evolution) -> Stored:
+    """What a run has stored by now."""
+    return Stored(
+        evolution.optimizer.population,
+        evolution.optimizer.fitness,
+        np.array(evolution.best_genomes),
+        np.array([record.best for record in evolution.records]),
+    )
+
+
+def candidates(stored: Stored) -> tuple[np.ndarray, np.ndarray]:
     """Genomes `(n, genes)` of the candidates and their stored fitness `(n,)`."""
-    population, fitness = evolution.optimizer.population, evolution.optimizer.fitness
+    population, fitness, best = stored.population, stored.fitness, stored.best
     n_best = max(1, round(BEST_OF_POPULATION * len(population)))
     order = np.argsort(-fitness, kind="stable")[:n_best]
     # the generations that raised the run's best
-    best = np.array([record.best for record in evolution.records])
     before = np.concatenate([[-np.inf], np.maximum.accumulate(best)[:-1]])
     raised = np.flatnonzero(best > before)[-LATEST_BEST:]
-    genomes = [population[order], np.array(evolution.best_genomes)[raised]]
-    genomes, stored = (
-        np.concatenate(genomes),
-        np.concatenate([fitness[order], best[raised]]),
-    )
+    genomes = np.concatenate([population[order], stored.best_genomes[raised]])
+    believed = np.concatenate([fitness[order], best[raised]])
     _, first = np.unique(genomes, axis=0, return_index=True)
     first.sort()
-    return genomes[first], stored[first]
+    return genomes[first], believed[first]
 
 
-def most_believed(evolution: Evolution) -> tuple[np.ndarray, float]:
+def most_believed(stored: Stored) -> tuple[np.ndarray, float]:
     """The genome `(genes,)` with the highest stored fitness, and that fitness.
 
     What a run without held-out starts would show as its best.
     """
-    best = [record.best for record in evolution.records]
-    generation = int(np.argmax(best))
-    return evolution.best_genomes[generation], best[generation]
+    generation = int(stored.best.argmax())
+    return stored.best_genomes[generation], float(stored.best[generation])
 
 
-def choose_champion(engine: Engine, evolution: Evolution) -> Champion:
-    """The candidate with the highest mean on the validation starts."""
+def choose_champion(engine: Engine, evolution: Evolution, stored: Stored) -> Champion:
+    """The candidate with the highest mean on the validation starts.
+
+    Args:
+        engine: what runs the trials.
+        evolution: whose setting is that of the trials.
+        stored: whose candidates they are.
+    """
     config = evolution.config
-    genomes, stored = candidates(evolution)
+    genomes, believed = candidates(stored)
     starts = starts_for_validation(evolution.space, config.validation_starts)
     # as it was evolved: robots that are disturbed alike
     met = held_out_disturbances(
@@ -81,4 +109,4 @@ def choose_champion(engine: Engine, evolution: Evolution) -> Champion:
         engine, config.topology, genomes, starts, disturbances=met
     ).fitness
     best = int(fitness.argmax())
-    return Champion(genomes[best], float(stored[best]), float(fitness[best]))
+    return Champion(genomes[best], float(believed[best]), float(fitness[best]))

@@ -99,6 +99,14 @@ class RunDirectory:
         return ExperimentConfig.from_yaml(str(state.get("config", "")), where)
 
     @property
+    def has_results(self) -> bool:
+        """Whether the run has come to an end, though some of it may be lost."""
+        try:
+            return files.is_file(self.champion) or self.marked_finished()
+        except UserError:
+            return True
+
+    @property
     def begun(self) -> bool:
         """Whether there is a run that can be gone on with."""
         return files.is_file(self.config) or files.is_file(self.checkpoint)

@@ -85,9 +85,7 @@ class Evolution:
     def _generation(self) -> Record:
         config = self.config
         generation = self.optimizer.generation
-        # the same starts for every individual, and for every algorithm of that seed
-        rng = random_generator(config.seed, Purpose.STARTS, generation)
-        starts = self.space.sample(rng, config.trials)
+        starts, met = self.trials(generation)
         genomes = self.optimizer.ask()
         to_beat = self.optimizer.to_beat() if self.racing else None
         evaluation = evaluate(
@@ -96,7 +94,7 @@ class Evolution:
             genomes,
             starts,
             to_beat,
-            self._disturbances(generation),
+            met,
         )
         self.optimizer.tell(evaluation.fitness)
         # the worst there is, what NaN counts as, is no number for a mean
@@ -115,11 +113,15 @@ class Evolution:
         self.best_genomes.append(self.optimizer.population[fitness.argmax()].copy())
         return record
 
-    def _disturbances(self, generation: int) -> Disturbances | None:
-        """Disturbances of a generation's trials, the same for every individual."""
+    def trials(self, generation: int) -> tuple[np.ndarray, Disturbances | None]:
+        """Starts `(trials, 3)` of a generation, and disturbances unless they are ideal.
+
+        The same for every individual, and for every algorithm of that seed.
+        """
         config, key = self.config, (Purpose.STARTS, generation)
         n, steps, seed = config.trials, config.steps, config.seed
-        return disturbances(config.conditions, n, steps, seed, *key)
+        starts = self.space.sample(random_generator(seed, *key), n)
+        return starts, disturbances(config.conditions, n, steps, seed, *key)
 
     def state(self) -> dict[str, np.ndarray]:
         """State from which evolution resumes, with the records so far."""

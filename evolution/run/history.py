@@ -1,6 +1,5 @@
 """Histories of a run: history.csv, best_individuals.npz and timing.csv."""
 
-import csv
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -101,11 +100,12 @@ def timing_text(
     """
     taken: dict[int, str] = {}
     if files.is_file(before):
-        text = before.read_text(encoding="utf-8", errors="replace")
-        for row in csv.DictReader(text.splitlines()):
+        columns = csv_columns(before.read_text(encoding="utf-8", errors="replace"))
+        numbers, each = (columns.get(name, []) for name in ("generation", "seconds"))
+        for number, text in zip(numbers, each, strict=False):
             # a row that was cut off says nothing
-            with suppress(KeyError, TypeError, ValueError):
-                taken[int(row["generation"])] = f"{float(row['seconds']):.3f}"
+            with suppress(ValueError):
+                taken[int(number)] = f"{float(text):.3f}"
     first = len(records) - len(seconds)
     taken |= {first + i: f"{each:.3f}" for i, each in enumerate(seconds)}
     lines = [
@@ -114,3 +114,12 @@ def timing_text(
         for record in records
     ]
     return "".join(["generation,seconds,control_steps,crash_rate\n", *lines])
+
+
+def csv_columns(text: str) -> dict[str, list[str]]:
+    """Columns of a text of comma-separated values, by name; empty what a row lacks."""
+    header, *rows = [line.split(",") for line in text.splitlines()] or [[]]
+    return {
+        name: [row[i] if i < len(row) else "" for row in rows]
+        for i, name in enumerate(header)
+    }

@@ -20,20 +20,25 @@ PATIENCE = 10.0
 """How long to wait for another process that opens the same study [s]."""
 
 
-def champions(place: Path) -> list[Path]:
-    """Champion files of the run or of all runs of the study at a path."""
+def runs_at(place: Path) -> list[RunDirectory]:
+    """The run at a path, or all runs of the study there, finished or not."""
     if not files.is_directory(place):
         return []
     run = RunDirectory(place)
-    if files.is_file(run.champion):
-        return [run.champion]
+    if run.begun or files.is_file(run.champion):
+        return [run]
     study = StudyDirectory(place)
     return [
-        path
+        study.run(name, seed)
         for name in sorted(each.name for each in place.iterdir() if each.is_dir())
         for seed in study.seeds(name)
-        if files.is_file(path := study.run(name, seed).champion)
     ]
+
+
+def champions(place: Path) -> list[Path]:
+    """Champion files of the run or of all runs of the study at a path."""
+    found = (run.champion for run in runs_at(place))
+    return [path for path in found if files.is_file(path)]
 
 
 class StudyDirectory:
