@@ -4,10 +4,15 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
+from epuck_mj.host.loading import prepare as _prepare
+
 if TYPE_CHECKING:
     from epuck_mj.environments.dm_control import SUITE, load
     from epuck_mj.errors import UserError
     from epuck_mj.scene.model import load_scene
+
+# the first of a command's modules: loading the others takes seconds
+_prepare()
 
 # Nothing here draws: without this, a machine without a display prints GLFW warnings.
 os.environ.setdefault("MUJOCO_GL", "disabled")

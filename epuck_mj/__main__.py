@@ -1,5 +1,9 @@
 """The commands of this package: `python -m epuck_mj`."""
 
+from collections.abc import Sequence
+
+from epuck_mj.host.command_line import main
+
 COMMANDS = {
     "epuck_mj.check": "list what is in an arena and what is wrong with it",
     "epuck_mj.view": "watch a champion in MuJoCo's own viewer",
@@ -19,5 +23,11 @@ def listing(commands: dict[str, str]) -> str:
     return "\n".join([*lines, "", "Each command explains its options with --help."])
 
 
-if __name__ == "__main__":
+def show(argv: Sequence[str]) -> int:
+    """Show the commands; the exit status."""
     print(listing(COMMANDS))
+    return 0
+
+
+if __name__ == "__main__":
+    main(show)

@@ -2,9 +2,12 @@
 
 import runpy
 import sys
+from collections.abc import Sequence
 
 from epuck_mj.__main__ import COMMANDS as ROBOT_COMMANDS
 from epuck_mj.__main__ import listing
+from epuck_mj.errors import UserError
+from epuck_mj.host.command_line import main
 
 COMMANDS = {
     "evolution.run": "evolve a controller, choose its champion, test it",
@@ -21,20 +24,35 @@ COMMANDS = {
 
 def script() -> None:
     """Run `epuck-mj COMMAND ...`: the command by the last part of its module's name."""
+    main(_command)
+
+
+def _command(argv: Sequence[str]) -> int:
+    """Run a command, or show all; the exit status.
+
+    Raises:
+        UserError: if there is no such command.
+        SystemExit: with the exit status of the command.
+    """
     modules = {
         module.rpartition(".")[2]: module for module in COMMANDS | ROBOT_COMMANDS
     }
-    if len(sys.argv) < 2 or sys.argv[1] in ("-h", "--help"):
-        print(listing(COMMANDS | ROBOT_COMMANDS))
+    if not argv or argv[0] in ("-h", "--help"):
+        show(argv)
         print(f"epuck-mj COMMAND is the same for: {', '.join(modules)}")
-        return
+        return 0
     name = sys.argv.pop(1)
     if name not in modules:
-        available = ", ".join(modules)
-        print(f"error: no command '{name}'; available: {available}", file=sys.stderr)
-        sys.exit(2)
+        raise UserError(f"no command '{name}'; available: {', '.join(modules)}")
     runpy.run_module(modules[name], run_name="__main__", alter_sys=True)
+    return 0
+
+
+def show(argv: Sequence[str]) -> int:
+    """Show the commands; the exit status."""
+    print(listing(COMMANDS | ROBOT_COMMANDS))
+    return 0
 
 
 if __name__ == "__main__":
-    print(listing(COMMANDS | ROBOT_COMMANDS))
+    main(show)

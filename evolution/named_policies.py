@@ -10,8 +10,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-import numpy as np
-
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.policies.file import load_controller
@@ -20,6 +18,7 @@ from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import START_CLEARANCE, Policy, TaskParameters
 from evolution.judging.scores import KnownScores
 from evolution.run.directory import RunDirectory
+from evolution.run.history import read_best_individuals
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import load_config
 from evolution.study.directory import champions
@@ -136,23 +135,14 @@ def _champion(path: Path, name: str, config: ExperimentConfig | None) -> NamedPo
 
 def _best_individuals(run: RunDirectory, generations: str) -> list[NamedPolicy]:
     """The best individuals of some generations of a run, which need not be finished."""
-    path = run.best_individuals
-    for file in (run.config, path):
+    for file in (run.config, run.best_individuals):
         if not files.is_file(file):
             raise UserError(
                 f"no '{file}': expected a run that has saved its generations"
             )
-    config, best = run.stored_config(), files.read_arrays(path)
-    genomes, fitness = (best.get(name, np.empty(0)) for name in ("genomes", "fitness"))
-    n, n_genes = fitness.size, config.topology.n_genes
-    if not n or fitness.shape != (n,) or genomes.shape != (n, n_genes):
-        raise UserError(
-            f"'{path}': expected genomes (generations, {n_genes}) and fitness "
-            f"(generations,), got {genomes.shape} and {fitness.shape}"
-        )
-    for array in (genomes, fitness):
-        if array.dtype != float or not np.isfinite(array).all():
-            raise UserError(f"'{path}': expected finite numbers")
+    config = run.stored_config()
+    n_genes = config.topology.n_genes
+    genomes, fitness = read_best_individuals(run.best_individuals, n_genes)
     return [
         NamedPolicy(
             str(run.path),
@@ -165,7 +155,7 @@ def _best_individuals(run: RunDirectory, generations: str) -> list[NamedPolicy]:
             config,
             f"generation {generation}",
         )
-        for generation in dict.fromkeys(_indices(generations, n))
+        for generation in dict.fromkeys(_indices(generations, len(fitness)))
     ]
 
 

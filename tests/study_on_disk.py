@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from epuck_mj.host import files
 from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.policies.network import Network
 from epuck_mj.step.control import TaskParameters
@@ -92,6 +93,9 @@ def _write_run(
         for g, e, best, mean, std in rows.tolist()
     )
     run.history.write_text("generation,evaluations,best,mean,std\n" + text)
+    genomes = np.zeros((len(rows), Network().n_genes))
+    best = {"genomes": genomes, "fitness": rows[:, 2]}
+    files.write_arrays(run.best_individuals, best)
     run.timing.write_text(
         "generation,seconds,control_steps,crash_rate\n"
         "0,1.5,1000,0.1\n1,1.5,900,0.1\n1,1.4,900,0.1\n"

@@ -28,13 +28,16 @@ from evolution.run.champion import (
     candidates,
     choose_champion,
     most_believed,
+    stored_by,
 )
 from evolution.run.directory import RunDirectory
-from evolution.run.generation_loop import Evolution, Record
+from evolution.run.generation_loop import Evolution
+from evolution.run.history import Record
 from evolution.run.results import write_results
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from evolution.settings.randomness import Purpose
+from tests.no_pictures import draw_nothing
 
 SHIPPED = ("de-best", "de-rand", "ga")
 
@@ -99,7 +102,7 @@ def slow_candidates(generations, share=0.1) -> dict[tuple, set[float]]:
 
 def test_candidates_are_the_top_tenth_and_the_best_so_far(finished):
     experiment, generations = finished
-    genomes, stored = candidates(experiment)
+    genomes, stored = candidates(stored_by(experiment))
     expected = slow_candidates(generations)
     found = [tuple(genome) for genome in genomes]
     assert len(found) == len(set(found))
@@ -123,7 +126,7 @@ def test_the_latest_twenty_of_the_best_so_far_are_candidates():
             record = Record(len(experiment.records), 0, best, 0.0, 0.0, 0, 0.0)
             experiment.records.append(record)
             experiment.best_genomes.append(rng.random(genes))
-    genomes, stored = candidates(experiment)
+    genomes, stored = candidates(stored_by(experiment))
     top = sorted(told, reverse=True)[:2]
     assert stored.tolist() == top + [10.0 + i for i in range(5, n)]
     latest = np.array(experiment.best_genomes)[15::3]
@@ -135,7 +138,7 @@ def test_a_genome_that_is_both_is_one_candidate():
     next(experiment.run())
     population, fitness = experiment.optimizer.population, experiment.optimizer.fitness
     order = np.argsort(-fitness, kind="stable")[:2]
-    genomes, stored = candidates(experiment)
+    genomes, stored = candidates(stored_by(experiment))
     np.testing.assert_array_equal(genomes, population[order])
     np.testing.assert_array_equal(stored, fitness[order])
 
@@ -149,7 +152,7 @@ def test_the_tenth_is_rounded_and_at_least_one(population, n):
     record = Record(0, population, fitness.max(), 0.0, 0.0, 0, 0.0)
     experiment.records.append(record)
     experiment.best_genomes.append(experiment.optimizer.population[fitness.argmax()])
-    _, stored = candidates(experiment)
+    _, stored = candidates(stored_by(experiment))
     assert stored.tolist() == sorted(fitness, reverse=True)[:n]
 
 
@@ -159,13 +162,13 @@ def test_the_tenth_is_rounded_and_at_least_one(population, n):
 def test_the_champion_is_best_on_the_validation_starts(finished):
     experiment, _ = finished
     starts = starts_for_validation(experiment.space, 12)
-    genomes, stored = candidates(experiment)
+    genomes, stored = candidates(stored_by(experiment))
     means = [
         np.mean([slow_trial(experiment, genome, start)[0] for start in starts])
         for genome in genomes
     ]
     best = max(range(len(means)), key=lambda i: (means[i], -i))
-    champion = choose_champion(experiment.engine, experiment)
+    champion = choose_champion(experiment.engine, experiment, stored_by(experiment))
     np.testing.assert_array_equal(champion.genome, genomes[best])
     assert champion.stored_fitness == stored[best]
     assert champion.validation_fitness == means[best]
@@ -185,7 +188,7 @@ def test_stored_fitness_does_not_choose_the_champion():
         record = Record(len(experiment.records), 20, best, 0.0, 0.0, 0, 0.0)
         experiment.records.append(record)
         experiment.best_genomes.append(genome)
-    champion = choose_champion(experiment.engine, experiment)
+    champion = choose_champion(experiment.engine, experiment, stored_by(experiment))
     np.testing.assert_array_equal(champion.genome, fast)
     assert champion.stored_fitness == 3.0
 
@@ -225,15 +228,14 @@ def written(tmp_path_factory):
     experiment = Evolution(tiny("de-best", steps=20), threads=1)
     list(experiment.run())
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(results, "_draw_fitness", lambda *_: None)
-        patch.setattr(results, "_show", lambda *_: None)
+        draw_nothing(patch)
         write_results(experiment, judges_of(experiment.config), directory, threads=1)
     return experiment, directory
 
 
 def test_the_champion_file_loads_and_acts_bit_for_bit(written):
     experiment, directory = written
-    champion = choose_champion(experiment.engine, experiment)
+    champion = choose_champion(experiment.engine, experiment, stored_by(experiment))
     stored = load_controller(directory.champion)
     assert stored.genome.tobytes() == champion.genome.tobytes()
     assert stored.network == experiment.config.topology
@@ -247,7 +249,7 @@ def test_the_champion_file_loads_and_acts_bit_for_bit(written):
 
 def test_the_champion_file_holds_every_score(written):
     experiment, directory = written
-    champion = choose_champion(experiment.engine, experiment)
+    champion = choose_champion(experiment.engine, experiment, stored_by(experiment))
     stored = load_controller(directory.champion)
     policy = experiment.config.topology.decode(champion.genome)
     tests = {
@@ -256,7 +258,7 @@ def test_the_champion_file_holds_every_score(written):
     }
     assert list(tests) == ["epuck_planar", "epuck"]
     # what evolution believed in most, on the robot that it was evolved on
-    genome, believed = most_believed(experiment)
+    genome, believed = most_believed(stored_by(experiment))
     judge = judges_of(experiment.config)["epuck_planar"]
     worth = judge.test(experiment.config.topology.decode(genome), 30)
     assert Scores.read(stored.scores, directory.champion) == Scores(
@@ -340,8 +342,7 @@ def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
 def test_a_run_on_the_wheeled_robot_is_tested_on_the_plane_as_well(
     tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(results, "_draw_fitness", lambda *_: None)
-    monkeypatch.setattr(results, "_show", lambda *_: None)
+    draw_nothing(monkeypatch)
     experiment = Evolution(tiny("ga", robot="epuck", steps=10, evaluations=20))
     list(experiment.run())
     directory = RunDirectory(tmp_path)
@@ -358,10 +359,13 @@ def test_a_champion_survives_the_checkpoint(finished, tmp_path):
     files.write_arrays(path, experiment.state())
     resumed = Evolution(experiment.config, threads=1)
     resumed.restore(files.read_arrays(path))
-    left, right = candidates(experiment), candidates(resumed)
+    left, right = candidates(stored_by(experiment)), candidates(stored_by(resumed))
     for a, b in zip(left, right, strict=True):
         np.testing.assert_array_equal(a, b)
-    a, b = (choose_champion(run.engine, run) for run in (experiment, resumed))
+    a, b = (
+        choose_champion(run.engine, run, stored_by(run))
+        for run in (experiment, resumed)
+    )
     assert a.genome.tobytes() == b.genome.tobytes()
     assert (a.stored_fitness, a.validation_fitness) == (
         b.stored_fitness,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evolution.judging.evaluation import BatchEngine, Work
-from evolution.run.champion import candidates, choose_champion, most_believed
+from evolution.run.champion import candidates, choose_champion, most_believed, stored_by
 from evolution.run.generation_loop import Evolution
 from evolution.search.ask_tell import AskTellError
 from evolution.settings.config import ExperimentConfig
@@ -146,10 +146,10 @@ def test_only_what_was_stored_on_wheels_counts_as_best_after_a_climb():
     evolution = evolved(config())
     cheap = evolution.records[:5]
     evolution.records[0] = type(cheap[0])(0, 8, 1e9, 0.0, 0.0, 1, 0.0)
-    genome, stored = most_believed(evolution)
+    genome, stored = most_believed(stored_by(evolution))
     assert stored < 1e9
     assert any((genome == other).all() for other in evolution.best_genomes[5:])
-    assert candidates(evolution)[1].max() < 1e9
+    assert candidates(stored_by(evolution))[1].max() < 1e9
 
 
 @pytest.mark.parametrize("finalists", [0, 1, 3])
@@ -161,8 +161,8 @@ def test_finalists_are_compared_on_wheels(monkeypatch, finalists):
     cheap, wheels = (
         Watched(scene, c.task, seen) for scene in (evolution.scene, evolution._wheels)
     )
-    champion = choose_champion(cheap, evolution, wheels)
-    everybody = len(candidates(evolution, share=1.0)[0])
+    champion = choose_champion(cheap, evolution, stored_by(evolution), wheels)
+    everybody = len(candidates(stored_by(evolution), share=1.0)[0])
     assert everybody >= 8
     expected = [("epuck_kinematic", everybody * 6), ("epuck_kinematic", 8 * 10)]
     if everybody > 8:

@@ -27,6 +27,7 @@ from evolution.settings.config_files import find_config, load_config
 from evolution.study.__main__ import study
 from evolution.study.cluster import carry_out_on_cluster, connection, requirements
 from evolution.study.jobs import Event, Job, carry_out, generations
+from tests.no_pictures import INSTEAD, draw_nothing
 from tests.processes import PATIENCE
 
 pytestmark = pytest.mark.slow
@@ -39,22 +40,10 @@ ENDLESS = SMALL | {"evaluations": 1_000_000}
 
 REPRODUCED = ("history.csv", "champion.json")
 
-# pictures are not drawn, here and by every worker
-QUICKER = """
+UNHURRIED = f"""
 from evolution.run import results
 
-
-QUICKER = [
-    (results, "_draw_fitness", lambda *_: None),
-    (results, "_show", lambda *_: None),
-]
-for place, name, value in QUICKER:
-    assert hasattr(place, name)
-"""
-UNHURRIED = (
-    QUICKER
-    + """
-    setattr(place, name, value)
+results._draw_fitness = results._show = {INSTEAD}
 
 import time
 from evolution.judging.evaluation import BatchEngine
@@ -68,7 +57,6 @@ def slept(self, work, run=BatchEngine.run):
 if BatchEngine.run.__name__ != "slept":
     BatchEngine.run = slept
 """
-)
 """What a worker runs first: its tasks leave time to kill it while it is at work."""
 
 
@@ -93,11 +81,8 @@ def jobs(folder: Path, *configs: ExperimentConfig) -> list[Job]:
 @pytest.fixture(autouse=True, scope="module")
 def quicker():
     """Runs in this process that take no longer than those of the workers."""
-    names: dict[str, Any] = {}
-    exec(QUICKER, names)
     with pytest.MonkeyPatch.context() as patch:
-        for place, name, value in names["QUICKER"]:
-            patch.setattr(place, name, value)
+        draw_nothing(patch)
         yield
 
 

@@ -14,7 +14,7 @@ ALL = COMMANDS | ROBOT_COMMANDS
 
 
 @pytest.mark.parametrize("module", ALL)
-def test_help_ends_with_examples_in_words(module, capsys, monkeypatch):
+def test_help_ends_with_examples_in_words(module, capsys, monkeypatch, handlers):
     # as in a fresh process
     for name in (module, f"{module}.__main__"):
         file = sys.modules.get(name)
@@ -35,15 +35,17 @@ def test_help_ends_with_examples_in_words(module, capsys, monkeypatch):
         assert raw not in text, raw
 
 
-def test_the_commands_are_listed(capsys, monkeypatch):
+def test_the_commands_are_listed(capsys, monkeypatch, handlers):
     monkeypatch.setattr(sys, "argv", ["epuck-mj"])
-    script()
+    with pytest.raises(SystemExit) as end:
+        script()
+    assert not end.value.code
     text = capsys.readouterr().out
     assert listing(ALL) in text
     assert all(text.count(f"python -m {module} ") == 1 for module in ALL)
 
 
-def test_an_unknown_command_is_one_line(capsys, monkeypatch):
+def test_an_unknown_command_is_one_line(capsys, monkeypatch, handlers):
     monkeypatch.setattr(sys, "argv", ["epuck-mj", "evolve"])
     with pytest.raises(SystemExit) as end:
         script()

@@ -1,8 +1,7 @@
-"""`evolution.evaluate` and `evolution.verify`: champions tested again, by anybody."""
+"""`evolution.evaluate`: champions tested again, by anybody."""
 
 import json
 import re
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +14,12 @@ from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.calibration import Calibration
 from evolution.evaluate import evaluate_policies
 from evolution.judging.held_out import Judge, Judges
-from evolution.run import results
 from evolution.run.directory import RunDirectory
 from evolution.run.execution import Run
 from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
-from evolution.verify import verify
+from tests.no_pictures import draw_nothing
 
 
 @pytest.fixture(scope="module")
@@ -36,8 +34,7 @@ def finished(tmp_path_factory) -> Path:
     run.start()
     assert len(list(run.evolve())) == 2
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(results, "_draw_fitness", lambda *_: None)
-        patch.setattr(results, "_show", lambda *_: None)
+        draw_nothing(patch)
         run.finish()
     return path
 
@@ -142,63 +139,6 @@ def test_threads_change_nothing(scene):
     assert sum(tests[0].behaviour.values()) == pytest.approx(1)
     low, high = tests[0].interval
     assert tests[0].worst < low < tests[0].mean < high
-
-
-def test_verify_finds_the_same_bits(finished, capsys):
-    assert verify([str(finished)]) == 0
-    assert verify([str(finished.parent.parent)]) == 0
-    assert capsys.readouterr().out.count("1 of 1 champions score the same") == 2
-
-
-def test_verify_names_what_differs(finished, tmp_path, capsys):
-    copy = tmp_path / "run"
-    copy.mkdir()
-    for name in ("config.yaml", "champion.json", "provenance.json"):
-        (copy / name).write_bytes((finished / name).read_bytes())
-    fields = json.loads((copy / "champion.json").read_text())
-    fields["scores"]["held_out"]["epuck"]["mean"] += 1
-    (copy / "champion.json").write_text(json.dumps(fields))
-    provenance = json.loads((copy / "provenance.json").read_text())
-    provenance["versions"]["mujoco"] = "3.0.0"
-    provenance["processor"]["flags"] = ["vax"]
-    (copy / "provenance.json").write_text(json.dumps(provenance))
-    assert verify([str(copy)]) == 1
-    text = capsys.readouterr().out
-    assert "epuck" in text
-    assert "mujoco 3.0.0 is now " in text
-    assert "CPU flags gone: vax" in text
-    assert "0 of 1 champions score the same" in text
-
-
-@pytest.mark.parametrize(
-    ("damage", "words"),
-    [
-        (lambda s: s["held_out"]["epuck"].update(crash_rate=0.5), "other crash_rate"),
-        (
-            lambda s: s["held_out"]["epuck_planar"]["behaviour"].update(spinner=0.5),
-            "epuck_planar, the same mean, but other behaviour",
-        ),
-        (lambda s: s["most_believed"].update(held_out=1.0), "the most believed 1.0 is"),
-    ],
-    ids=["crash rate", "behaviour", "most believed"],
-)
-def test_verify_compares_everything_that_is_reported(
-    finished, tmp_path, capsys, damage, words
-):
-    copy = tmp_path / "run"
-    shutil.copytree(finished, copy)
-    fields = json.loads((copy / "champion.json").read_text())
-    damage(fields["scores"])
-    (copy / "champion.json").write_text(json.dumps(fields))
-    assert verify([str(copy)]) == 1
-    assert words in capsys.readouterr().out
-
-
-def test_verify_needs_a_champion(tmp_path):
-    with pytest.raises(UserError, match="no champion in"):
-        verify([str(tmp_path)])
-    with pytest.raises(UserError, match="expected run or study directories"):
-        verify([])
 
 
 def test_the_most_believed_is_tested_too(finished):

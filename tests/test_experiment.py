@@ -12,7 +12,8 @@ from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.step.control import TaskParameters, control_step
 from epuck_mj.step.sensors import observe
 from evolution.judging.held_out_starts import starts_for_test, starts_for_validation
-from evolution.run.generation_loop import HISTORY, Evolution, Record
+from evolution.run.generation_loop import Evolution
+from evolution.run.history import HISTORY, Record
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from evolution.settings.randomness import Purpose, random_generator

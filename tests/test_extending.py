@@ -21,6 +21,7 @@ from epuck_mj.step.fitness import StepFacts, step_fitness
 from evolution.run.__main__ import evolve
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import load_config
+from tests.no_pictures import draw_nothing
 from tests.processes import PATIENCE
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -58,7 +59,9 @@ if __name__ == "__main__":
     for i, line in enumerate(json.loads(sys.argv.pop(1))):
         if i == 2:
             # one run is drawn and replayed, the others need not be
-            results._draw_fitness = results._show = lambda *_: None
+            results._draw_fitness = results._show = (
+                lambda _, run, *__: [each.write_bytes(b"-") for each in run.pictures]
+            )
         if line.startswith("python"):
             command(line)
         else:
@@ -140,8 +143,7 @@ def here(folder, tmp_path, monkeypatch) -> Path:
     for name, text in PARTS.items():
         (tmp_path / name).write_text(text)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("evolution.run.results._draw_fitness", lambda *_: None)
-    monkeypatch.setattr("evolution.run.results._show", lambda *_: None)
+    draw_nothing(monkeypatch)
     return tmp_path
 
 

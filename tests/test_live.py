@@ -11,12 +11,12 @@ import pytest
 from rerun.chunk import RrdReader
 
 from epuck_mj.errors import UserError
-from epuck_mj.show import figures, pictures, recording
 from evolution.replay.viewer import viewer_binary
 from evolution.replay.web import free_ports
-from evolution.run import live, results
+from evolution.run import live
 from evolution.run.__main__ import evolve
 from evolution.run.directory import RunDirectory
+from tests.no_pictures import draw_nothing
 from tests.processes import PATIENCE
 
 FEW = ("--validation-starts", "5", "--test-starts", "5", "--threads", "1")
@@ -37,10 +37,7 @@ def quiet(monkeypatch, tmp_path):
 @pytest.fixture(autouse=True)
 def few_pictures(monkeypatch):
     """Runs are finished without pictures and a recording, which take their time."""
-    monkeypatch.setattr(results, "_draw_fitness", lambda *_: None)
-    monkeypatch.setattr(pictures, "save_figure", lambda *_: None)
-    monkeypatch.setattr(recording, "save_recording", lambda *_: None)
-    monkeypatch.setattr(figures, "trajectory_figure", lambda *_: None)
+    draw_nothing(monkeypatch)
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import termios
 import time
 from pathlib import Path
 
-from evolution.run.generation_loop import Record
+from evolution.run.history import Record
 from evolution.run.progress import LINES, TICK, Progress
 
 ROOT = Path(__file__).resolve().parent.parent

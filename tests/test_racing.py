@@ -19,7 +19,7 @@ from epuck_mj.step.fitness import FORMULAS, step_fitness
 from epuck_mj.trials.recorder import record
 from evolution.judging import evaluation
 from evolution.judging.evaluation import ROUNDING, BatchEngine, Race, evaluate
-from evolution.run.champion import choose_champion
+from evolution.run.champion import choose_champion, stored_by
 from evolution.run.generation_loop import Evolution
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
@@ -320,7 +320,7 @@ def test_the_same_champion_is_chosen(name):
     for racing in (True, False):
         experiment = small_one(name, racing)
         engine = BatchEngine(experiment.scene, experiment.config.task, 1)
-        chosen.append(choose_champion(engine, experiment))
+        chosen.append(choose_champion(engine, experiment, stored_by(experiment)))
     one, other = chosen
     assert one.genome.tobytes() == other.genome.tobytes()
     assert replace(one, genome=other.genome) == other

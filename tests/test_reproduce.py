@@ -9,9 +9,9 @@ from epuck_mj.errors import UserError
 from evolution.reproduce import __main__ as module
 from evolution.reproduce.__main__ import reproduce_paper
 from evolution.reproduce.verdicts import OTHER_STUDY
-from evolution.run import results
 from evolution.run.means import Means
 from evolution.study.jobs import Event, Job, carry_out
+from tests.no_pictures import draw_nothing
 
 TINY = """
 experiments: [ga.yaml, de-best.yaml]
@@ -44,8 +44,7 @@ def carry_out_here(patch: pytest.MonkeyPatch) -> None:
             carry_out(job, means, lambda evaluations: None)
             yield Event(job, ended=True)
 
-    patch.setattr(results, "_draw_fitness", lambda *_: None)
-    patch.setattr(results, "_show", lambda *_: None)
+    draw_nothing(patch)
     patch.setattr("evolution.study.__main__.carry_out_side_by_side", here)
 
 

@@ -21,7 +21,7 @@ from evolution.reproduce.publish import PAGES, pages_with_tables, shipped
 from evolution.run.directory import RunDirectory
 from evolution.study.config import StudyConfig, find_study
 from evolution.study.data import load_study
-from evolution.verify import changes
+from evolution.verify.__main__ import changes
 
 ROOT = MODELS.parent
 RESULTS = ROOT / "results"

@@ -30,13 +30,14 @@ from epuck_mj.step.calibration import Calibration
 from epuck_mj.trials.trajectory import Trajectory
 from evolution.judging.scores import Scores
 from evolution.run import __main__ as run_command
-from evolution.run import execution, results
+from evolution.run import execution
 from evolution.run.__main__ import evolve
-from evolution.run.directory import LOCK
-from evolution.run.generation_loop import HISTORY, Record
+from evolution.run.history import HISTORY, Record
+from evolution.run.lock import LOCK
 from evolution.run.progress import Progress
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import CONFIGS, find_config, load_config
+from tests.no_pictures import draw_nothing
 from tests.processes import PATIENCE, python_process
 from tests.shipped import OPTIMIZERS
 
@@ -61,7 +62,6 @@ PROMISED = {
     "champion.rrd",
 }
 THERE = PROMISED | {LOCK}
-DRAWN = {"fitness.png", "trajectory.npz", "trajectory.png", "champion.rrd"}
 REPRODUCED = ("history.csv", "champion.json")
 
 
@@ -135,8 +135,7 @@ def here(tmp_path, monkeypatch):
 @pytest.fixture
 def no_pictures(monkeypatch):
     """Nothing is drawn."""
-    monkeypatch.setattr(results, "_draw_fitness", lambda *_: None)
-    monkeypatch.setattr(results, "_show", lambda *_: None)
+    draw_nothing(monkeypatch)
 
 
 @pytest.fixture
@@ -189,8 +188,7 @@ def reference(tmp_path_factory):
     """A longer run that nothing interrupted."""
     directory = tmp_path_factory.mktemp("reference") / "run"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(results, "_draw_fitness", lambda *_: None)
-        patch.setattr(results, "_show", lambda *_: None)
+        draw_nothing(patch)
         assert evolve(["ga", "--seed", "7", *LONG, "--output", str(directory)]) == 0
     return directory
 
@@ -729,7 +727,7 @@ def test_kill_9_at_any_moment_loses_at_most_one_generation(
     assert evolve(argv) == 0
     assert_reproduced(directory, reference)
     assert n_records(directory) == LONG_GENERATIONS
-    assert {path.name for path in directory.iterdir()} == THERE - DRAWN
+    assert {path.name for path in directory.iterdir()} == THERE
     timed = (directory / "timing.csv").read_text().split()[1:]
     assert [int(row.split(",")[0]) for row in timed] == list(range(LONG_GENERATIONS))
     # a kill may take the seconds of generations, never their control steps

@@ -19,15 +19,17 @@ import pytest
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from evolution.run import execution, results
+from evolution.run import execution
 from evolution.run.__main__ import evolve
-from evolution.run.directory import LOCK, RunDirectory
+from evolution.run.directory import RunDirectory
+from evolution.run.lock import LOCK
 from evolution.run.means import Means
 from evolution.settings.config_files import load_config
 from evolution.study import __main__ as module
 from evolution.study import jobs
 from evolution.study.__main__ import study
 from evolution.study.jobs import Event, Job, carry_out, failure_log, failure_of
+from tests.no_pictures import INSTEAD, draw_nothing
 from tests.processes import PATIENCE, python_process
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -50,7 +52,7 @@ REPRODUCED = ("history.csv", "champion.json")
 LONG = 60
 """Evaluations of runs that are interrupted, in 6 generations."""
 
-QUICK = """
+QUICK = f"""
 from epuck_mj.host.command_line import main
 from evolution.study import __main__ as study
 
@@ -58,7 +60,7 @@ from evolution.study import __main__ as study
 if __name__ != "__main__":
     from evolution.run import results
 
-    results._draw_fitness = results._show = lambda *_: None
+    results._draw_fitness = results._show = {INSTEAD}
 """
 HALTING = """
     import math, time
@@ -106,8 +108,7 @@ def write_study(folder: Path, evaluations: int = 20) -> None:
 
 def make_quick(patch: pytest.MonkeyPatch) -> None:
     """As in `QUICK`."""
-    patch.setattr(results, "_draw_fitness", lambda *_: None)
-    patch.setattr(results, "_show", lambda *_: None)
+    draw_nothing(patch)
 
 
 def assert_reproduced(directory: Path, reference: Path) -> None:

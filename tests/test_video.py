@@ -83,6 +83,22 @@ def test_a_video_that_cannot_be_written_is_one_line(scene, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@needs_opengl
+def test_a_video_that_ffmpeg_cannot_finish_is_one_line(scene, tmp_path):
+    """As where the folder for temporary files is full; ffmpeg's status is 0."""
+    resource = pytest.importorskip("resource", reason="limits of POSIX")
+    trajectory = record(scene, ahead, np.zeros(3), TaskParameters(steps=1))
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with pytest.raises(UserError, match="ffmpeg could not finish it") as error:
+            film(tmp_path / "trial.mp4", scene, [trajectory])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert "\n" not in str(error.value)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_without_the_extra_one_line_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.delitem(sys.modules, "epuck_mj.show.video", raising=False)

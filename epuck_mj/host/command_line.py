@@ -2,7 +2,6 @@
 
 import contextlib
 import io
-import os
 import re
 import shlex
 import sys
@@ -13,12 +12,15 @@ from typing import Any, TypeVar
 import tyro
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.output import (
-    OUTPUT_LOST,
-    OutputLost,
+from epuck_mj.host import loading
+from epuck_mj.host.hardship import (
     complain,
-    occupy_standard_streams,
+    give_up_streams,
+    hardship,
+    standard_streams,
 )
+from epuck_mj.host.interruption import follows
+from epuck_mj.host.output import OUTPUT_LOST, OutputLost
 
 Options = TypeVar("Options")
 
@@ -124,24 +126,49 @@ EXTRAS = (
 def main(run: Callable[[Sequence[str]], int]) -> None:
     """Run a command line and leave the process with its exit status.
 
-    `run` may raise `UserError` for anything that the user can put right.
+    `run` may raise `UserError` for anything that the user can put right. What the
+    computer lacks is one line as well; only errors of the program show a traceback.
     """
-    occupy_standard_streams()
+    loading.raise_interrupts()
     try:
-        status = run(sys.argv[1:])
+        status = _status(run)
     except OutputLost as error:
-        complain(f"error: {error}")
+        complain(str(error))
         status = OUTPUT_LOST
     except UserError as error:
-        complain(f"error: {error}")
+        complain(str(error))
         status = 2
     except KeyboardInterrupt:
-        status = 130
+        status = loading.INTERRUPTED
     except BrokenPipeError:
-        # stdout is closed; python's own flush at exit must not complain
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = 1
+    except Exception as error:
+        line = hardship(error)
+        # libraries that are interrupted while they load say that they failed
+        if follows(error, KeyboardInterrupt):
+            status = loading.INTERRUPTED
+        elif line is None:
+            raise
+        else:
+            complain(line)
+            status = 2
+    give_up_streams()
+    # nothing is left to be tidied up
+    loading.end_at_interrupts()
     sys.exit(status)
+
+
+def _status(run: Callable[[Sequence[str]], int]) -> int | str | None:
+    """The exit status of a command line whose output has left the process."""
+    standard_streams()
+    try:
+        status = run(sys.argv[1:])
+    except SystemExit as end:
+        # after help
+        status = end.code
+    # a full disk may show only here
+    sys.stdout.flush()
+    return status
 
 
 def shell_command(module: str, *arguments: str | Path) -> str:

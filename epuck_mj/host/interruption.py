@@ -71,7 +71,7 @@ class Interruption:
             yield
         except Exception as error:
             # whatever was interrupted may have failed to clear up
-            if _follows_interruption(error):
+            if follows(error, Interrupted):
                 raise Interrupted from error
             raise
         finally:
@@ -85,11 +85,11 @@ class Interruption:
             raise Interrupted
 
 
-def _follows_interruption(error: BaseException) -> bool:
-    """Whether an exception was raised while an interruption was handled."""
-    cause = error.__context__
-    while cause is not None and not isinstance(cause, Interrupted):
-        cause = cause.__context__
+def follows(error: BaseException, kind: type[BaseException]) -> bool:
+    """Whether an exception was raised while one of another kind was handled."""
+    cause = error.__cause__ or error.__context__
+    while cause is not None and not isinstance(cause, kind):
+        cause = cause.__cause__ or cause.__context__
     return cause is not None
 
 

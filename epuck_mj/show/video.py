@@ -57,14 +57,36 @@ def save_video(
         file = Path(folder, "video.mp4")
         with painter(scene, trajectories, width, height, draft=True) as artist:
             frames = imageio_ffmpeg.write_frames(
-                str(file), (width, height), fps=FRAME_RATE, macro_block_size=2
+                str(file),
+                (width, height),
+                fps=FRAME_RATE,
+                macro_block_size=2,
+                # what went wrong is said in one line
+                ffmpeg_log_level="quiet",
             )
             frames.send(None)
             try:
                 for i, time in enumerate(times):
-                    frames.send(np.ascontiguousarray(artist.picture(time)))
+                    picture = np.ascontiguousarray(artist.picture(time))
+                    try:
+                        frames.send(picture)
+                    except OSError:
+                        break
                     progress(i + 1, len(times))
             finally:
                 frames.close()
+        if _n_frames(file) != len(times):
+            raise UserError(
+                f"cannot write '{path}': ffmpeg could not finish it; is there room in "
+                f"the folder for temporary files, '{tempfile.gettempdir()}'?"
+            )
         with writing():
             write_bytes(Path(path), file.read_bytes())
+
+
+def _n_frames(file: Path) -> int | None:
+    """Number of pictures that can be read from a video; ffmpeg does not say if all."""
+    try:
+        return imageio_ffmpeg.count_frames_and_secs(str(file))[0]
+    except RuntimeError:
+        return 0

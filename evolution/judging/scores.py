@@ -1,7 +1,7 @@
 """Scores of champions, as in their files.
 
-`read` reads scores and refuses invalid ones. `to_dict` gives the known scores as plain
-values.
+`read` and `read_champion` read scores and refuse invalid ones. `to_dict` gives the
+known scores as plain values.
 """
 
 import math
@@ -12,6 +12,7 @@ from typing import Any, Self
 from pydantic import BaseModel, Field, StrictFloat, StrictInt, ValidationError
 
 from epuck_mj.errors import UserError
+from epuck_mj.policies.file import ControllerFile, load_controller
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.step.fitness import of_most
 
@@ -158,6 +159,16 @@ def _in_words(tests: Mapping[str, HeldOut]) -> str:
         f"{robot} {test.mean:.1f} ({test.crash_rate:.0%} crash)"
         for robot, test in tests.items()
     )
+
+
+def read_champion(path: Path) -> tuple[ControllerFile, Scores]:
+    """The champion in a file, and its scores.
+
+    Raises:
+        UserError: if it cannot be read, or is damaged.
+    """
+    champion = load_controller(path)
+    return champion, Scores.read(champion.scores, path)
 
 
 class KnownScores(Scores, frozen=True):

@@ -1,16 +1,18 @@
 """The table of runs, runs.csv: what each run found."""
 
-import csv
 import math
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+from epuck_mj.errors import UserError
+from epuck_mj.host.files import read_text
 from evolution.judging.scores import HeldOut
 from evolution.pages.words import robot_name
 from evolution.report.measures import shown_robots
 from evolution.run.directory import RunDirectory
+from evolution.run.history import csv_columns
 from evolution.study.data import RunData, StudyData
 
 T = TypeVar("T")
@@ -25,13 +27,13 @@ FITNESS = "fitness"
 def control_steps(run: RunData) -> int | None:
     """Control steps that a run took, None if it did not count them."""
     try:
-        with RunDirectory(run.path).timing.open(encoding="utf-8", newline="") as file:
-            rows = csv.DictReader(file)
-            # in older files a generation that was done twice stands twice
-            steps = {row["generation"]: int(row["control_steps"]) for row in rows}
-    except (OSError, ValueError, KeyError, TypeError):
+        columns = csv_columns(read_text(RunDirectory(run.path).timing))
+        steps = map(int, columns["control_steps"])
+        # in older files a generation that was done twice stands twice
+        each = dict(zip(columns["generation"], steps, strict=True))
+    except (UserError, KeyError, ValueError):
         return None
-    return sum(steps.values()) or None
+    return sum(each.values()) or None
 
 
 TEST_COLUMNS: Mapping[str, Column[HeldOut]] = {

@@ -14,7 +14,6 @@ from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.reproduce.__main__ import reproduce_paper
-from evolution.run.directory import RunDirectory
 from evolution.study.directory import StudyDirectory
 
 REPORTED = ("paper", "wheels")
@@ -70,7 +69,7 @@ def ship(source: Path, target: Path) -> None:
         for seed in study.seeds(name):
             run, copy = study.run(name, seed), copies.run(name, seed)
             if run.finished:
-                pairs += zip(_kept(run), _kept(copy), strict=True)
+                pairs += zip(run.kept, copy.kept, strict=True)
     if pairs:
         pairs.append((study.config, copies.config))
         pairs.append((study.asked, copies.asked))
@@ -79,17 +78,6 @@ def ship(source: Path, target: Path) -> None:
         if path.exists():
             copy.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, copy)
-
-
-def _kept(run: RunDirectory) -> list[Path]:
-    return [
-        run.config,
-        run.history,
-        run.best_individuals,
-        run.champion,
-        run.timing,
-        run.provenance,
-    ]
 
 
 def pages_with_tables(root: Path) -> dict[Path, str]:

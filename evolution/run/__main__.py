@@ -108,10 +108,14 @@ def _run(
     from evolution.run.execution import Run
     from evolution.run.means import Means
 
+    resumed = options.resume is not None
+    lost = directory.lost() if resumed and directory.marked_finished() else []
     means = Means(options.engine, options.threads, options.racing)
     run = Run(options.config, directory, means, argv)
     with directory.locked():
-        if options.resume is not None:
+        if resumed:
+            if lost:
+                print(f"written again: {'; '.join(lost)}", file=sys.stderr)
             differing = run.resume()
             if differing:
                 print(

@@ -46,52 +46,68 @@ class Champion:
     validation_fitness: float
 
 
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """What a run stored of its individuals.
+
+    Attributes:
+        population: genomes of the final population, `(n, genes)`.
+        fitness: of the final population, `(n,)`.
+        best_genomes: the best individual of each generation, `(generations, genes)`.
+        best: its fitness, `(generations,)`.
+    """
+
+    population: np.ndarray
+    fitness: np.ndarray
+    best_genomes: np.ndarray
+    best: np.ndarray
+
+
+def stored_by(evolution: Evolution) -> Stored:
+    """What a run has stored by now; of one that has climbed, since then."""
+    same = [record.climbed == evolution.climbed for record in evolution.records]
+    first = same.index(True)
+    return Stored(
+        evolution.optimizer.population,
+        evolution.optimizer.fitness,
+        np.array(evolution.best_genomes[first:]),
+        np.array([record.best for record in evolution.records[first:]]),
+    )
+
+
 def candidates(
-    evolution: Evolution, share: float = BEST_OF_POPULATION
+    stored: Stored, share: float = BEST_OF_POPULATION
 ) -> tuple[np.ndarray, np.ndarray]:
     """Genomes `(n, genes)` of the candidates and their stored fitness `(n,)`.
 
     Args:
-        evolution: a finished run.
+        stored: what a run stored.
         share: of the final population whose members are candidates.
     """
-    population, fitness = evolution.optimizer.population, evolution.optimizer.fitness
+    population, fitness, best = stored.population, stored.fitness, stored.best
     n_best = max(1, round(share * len(population)))
     order = np.argsort(-fitness, kind="stable")[:n_best]
     # the generations that raised the run's best
-    first, best = _best_at_last(evolution)
     before = np.concatenate([[-np.inf], np.maximum.accumulate(best)[:-1]])
     raised = np.flatnonzero(best > before)[-LATEST_BEST:]
-    genomes = [population[order], np.array(evolution.best_genomes)[first + raised]]
-    genomes, stored = (
-        np.concatenate(genomes),
-        np.concatenate([fitness[order], best[raised]]),
-    )
+    genomes = np.concatenate([population[order], stored.best_genomes[raised]])
+    believed = np.concatenate([fitness[order], best[raised]])
     _, first = np.unique(genomes, axis=0, return_index=True)
     first.sort()
-    return genomes[first], stored[first]
+    return genomes[first], believed[first]
 
 
-def most_believed(evolution: Evolution) -> tuple[np.ndarray, float]:
+def most_believed(stored: Stored) -> tuple[np.ndarray, float]:
     """The genome `(genes,)` with the highest stored fitness, and that fitness.
 
     What a run without held-out starts would show as its best.
     """
-    first, best = _best_at_last(evolution)
-    generation = int(np.argmax(best))
-    return evolution.best_genomes[first + generation], float(best[generation])
-
-
-def _best_at_last(evolution: Evolution) -> tuple[int, np.ndarray]:
-    """First generation on the robot of the last, and the best fitness since then."""
-    records = evolution.records
-    same = [record.climbed == evolution.climbed for record in records]
-    first = same.index(True)
-    return first, np.array([record.best for record in records[first:]])
+    generation = int(stored.best.argmax())
+    return stored.best_genomes[generation], float(stored.best[generation])
 
 
 def choose_champion(
-    engine: Engine, evolution: Evolution, wheels: Engine | None = None
+    engine: Engine, evolution: Evolution, stored: Stored, wheels: Engine | None = None
 ) -> Champion:
     """The candidate with the highest mean on validation starts.
 
@@ -101,24 +117,26 @@ def choose_champion(
 
     Args:
         engine: of the robot that evolution began with.
-        evolution: a finished run.
+        evolution: whose setting is that of the trials.
+        stored: whose candidates they are.
         wheels: engine of the robot on wheels, for finalists.
     """
     config = evolution.config
     n = config.validation_starts
     if config.robot != KINEMATIC_ROBOT:
-        genomes, stored = candidates(evolution)
-        return _best(genomes, stored, _validated(engine, evolution, genomes, n))
-    genomes, stored = candidates(evolution, share=1.0)
+        genomes, believed = candidates(stored)
+        return _best(genomes, believed, _validated(engine, evolution, genomes, n))
+    genomes, believed = candidates(stored, share=1.0)
     rounds = [(engine, n, SCREENED), (engine, max(n, N_SCREENING), config.finalists)]
     if config.finalists and wheels is not None:
         rounds.append((wheels, n, 1))
-    fitness = stored
+    fitness = believed
     for judge, starts, kept in rounds:
         fitness = _validated(judge, evolution, genomes, starts)
         order = np.argsort(-fitness, kind="stable")[: max(kept, 1)]
-        genomes, stored, fitness = genomes[order], stored[order], fitness[order]
-    return _best(genomes, stored, fitness)
+        genomes, believed = genomes[order], believed[order]
+        fitness = fitness[order]
+    return _best(genomes, believed, fitness)
 
 
 def _validated(
@@ -134,6 +152,6 @@ def _validated(
     return evaluate(engine, config.topology, genomes, starts, disturbances=met).fitness
 
 
-def _best(genomes: np.ndarray, stored: np.ndarray, fitness: np.ndarray) -> Champion:
+def _best(genomes: np.ndarray, believed: np.ndarray, fitness: np.ndarray) -> Champion:
     best = int(fitness.argmax())
-    return Champion(genomes[best], float(stored[best]), float(fitness[best]))
+    return Champion(genomes[best], float(believed[best]), float(fitness[best]))

@@ -1,58 +1,25 @@
 """The run directory: the files of a run, from which it can be resumed."""
 
-import csv
-from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from filelock import FileLock, Timeout
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.host.yaml_and_json import read_json
 from epuck_mj.policies.file import CHAMPION
-from evolution.run.provenance import now, to_json
+from evolution.judging.scores import read_champion
+from evolution.run.history import read_history, timing_text
+from evolution.run.lock import LOCK, locked
+from evolution.run.provenance import now, read_provenance, to_json
 from evolution.settings.comparison import differing_keys
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import load_config
 
 if TYPE_CHECKING:
     from evolution.run.generation_loop import Evolution
-
-LOCK = ".lock"
-"""File that is locked by the process that works in a directory."""
-
-
-@contextmanager
-def locked(directory: Path, patience: float = 0.0) -> Iterator[None]:
-    """Lock a directory against other processes for the block.
-
-    Args:
-        directory: made if it is not there.
-        patience: how long to wait for another process to leave [s].
-
-    Raises:
-        UserError: if another process stays, or the directory cannot be made.
-    """
-    with files.writing():
-        directory.mkdir(parents=True, exist_ok=True)
-    lock = FileLock(directory / LOCK, timeout=patience)
-    try:
-        lock.acquire()
-    except Timeout:
-        raise UserError(
-            f"another process is working in '{directory}': wait for it, or stop it"
-        ) from None
-    except OSError as error:
-        raise UserError(f"cannot write output '{directory}': {error.strerror}") from (
-            None
-        )
-    try:
-        yield
-    finally:
-        lock.release()
 
 
 class RunDirectory:
@@ -111,14 +78,38 @@ class RunDirectory:
             files.write_text(self.provenance, to_json(provenance))
 
     def stored_config(self) -> ExperimentConfig:
-        """The config of the run in the directory.
+        """The config of the run in the directory; of its checkpoint if that is lost.
 
         Raises:
             UserError: if there is none.
         """
-        if not files.is_file(self.config):
-            raise UserError(f"no run in '{self.path}': no '{self.config}'")
-        return load_config(self.config)
+        if files.is_file(self.config):
+            return load_config(self.config)
+        if files.is_file(self.checkpoint):
+            return self.checkpoint_config(files.read_arrays(self.checkpoint))
+        raise UserError(f"no run in '{self.path}': no '{self.config}'")
+
+    def checkpoint_config(self, state: Mapping[str, np.ndarray]) -> ExperimentConfig:
+        """The config in the arrays of the checkpoint.
+
+        Raises:
+            UserError: if there is none.
+        """
+        where = f"its config in '{self.checkpoint}'"
+        return ExperimentConfig.from_yaml(str(state.get("config", "")), where)
+
+    @property
+    def has_results(self) -> bool:
+        """Whether the run has come to an end, though some of it may be lost."""
+        try:
+            return files.is_file(self.champion) or self.marked_finished()
+        except UserError:
+            return True
+
+    @property
+    def begun(self) -> bool:
+        """Whether there is a run that can be gone on with."""
+        return files.is_file(self.config) or files.is_file(self.checkpoint)
 
     def refuse_other_config(self, config: ExperimentConfig) -> None:
         """Refuse to resume with a changed config.
@@ -145,26 +136,40 @@ class RunDirectory:
         """
         first = self.provenance_fields() or provenance
         self._refuse_other_models(first, provenance)
-        if self.checkpoint.exists():
-            state = files.read_arrays(self.checkpoint)
-            try:
-                config = str(state.pop("config", ""))
-                where = f"its config in '{self.checkpoint}'"
-                if ExperimentConfig.from_yaml(config, where) != evolution.config:
-                    raise ValueError("it was made with another config")
-                evolution.restore(state)
-            except ValueError as error:
-                raise UserError(
-                    f"'{self.checkpoint}' is not a checkpoint of this run: {error}"
-                ) from None
+        if files.is_file(self.checkpoint):
+            self.restore_checkpoint(evolution)
+        elif files.is_file(self.champion) or files.is_file(self.history):
+            raise UserError(
+                f"cannot resume '{self.path}': without '{self.checkpoint.name}' the "
+                "run could only begin again, over what is there: remove it, or begin "
+                "in another directory"
+            )
         with files.writing():
             files.remove_leftovers(self.path)
+            if not files.is_file(self.config):
+                files.write_text(self.config, evolution.config.to_yaml())
             # the run may have been killed between its files
             self._write_derived(evolution, ())
             resumed = [*first.get("resumed", ()), provenance]
             files.write_text(self.provenance, to_json({**first, "resumed": resumed}))
         keys = ("versions", "git", "processor")
         return [key for key in keys if first.get(key) != provenance[key]]
+
+    def restore_checkpoint(self, evolution: "Evolution") -> None:
+        """Restore the evolution from the checkpoint.
+
+        Raises:
+            UserError: if it cannot be read or belongs to something else.
+        """
+        state = files.read_arrays(self.checkpoint)
+        try:
+            if self.checkpoint_config(state) != evolution.config:
+                raise ValueError("it was made with another config")
+            evolution.restore(state)
+        except ValueError as error:
+            raise UserError(
+                f"'{self.checkpoint}' is not a checkpoint of this run: {error}"
+            ) from None
 
     def _refuse_other_models(self, first: dict, now: dict) -> None:
         before, after = first.get("mjcf_sha256"), now["mjcf_sha256"]
@@ -212,25 +217,8 @@ class RunDirectory:
                 "fitness": np.array([record.best for record in evolution.records]),
             }
             files.write_arrays(self.best_individuals, best)
-            files.write_text(self.timing, self._timing(evolution, seconds))
-
-    def _timing(self, evolution: "Evolution", seconds: Sequence[float]) -> str:
-        """Text of timing.csv; seconds are empty where a kill lost them."""
-        taken: dict[int, str] = {}
-        if files.is_file(self.timing):
-            text = self.timing.read_text(encoding="utf-8", errors="replace")
-            for row in csv.DictReader(text.splitlines()):
-                # a row that was cut off says nothing
-                with suppress(KeyError, TypeError, ValueError):
-                    taken[int(row["generation"])] = f"{float(row['seconds']):.3f}"
-        first = len(evolution.records) - len(seconds)
-        taken |= {first + i: f"{each:.3f}" for i, each in enumerate(seconds)}
-        lines = [
-            f"{record.generation},{taken.get(record.generation, '')},"
-            f"{record.control_steps},{record.crash_rate:.4f}\n"
-            for record in evolution.records
-        ]
-        return "".join(["generation,seconds,control_steps,crash_rate\n", *lines])
+            timing = timing_text(evolution.records, seconds, self.timing)
+            files.write_text(self.timing, timing)
 
     def evaluations(self) -> int:
         """Individuals evaluated up to the checkpoint."""
@@ -239,9 +227,69 @@ class RunDirectory:
         return int(files.read_arrays(self.checkpoint)["records"][-1, 1])
 
     @property
+    def kept(self) -> tuple[Path, ...]:
+        """Files of a finished run that cannot be made anew without its checkpoint."""
+        return (
+            self.config,
+            self.history,
+            self.best_individuals,
+            self.champion,
+            self.timing,
+            self.provenance,
+        )
+
+    @property
+    def pictures(self) -> tuple[Path, ...]:
+        """Files that show the champion of a finished run."""
+        return (
+            self.fitness_figure,
+            self.trajectory,
+            self.trajectory_figure,
+            self.recording,
+        )
+
+    @property
     def finished(self) -> bool:
-        """Whether the run has written everything."""
+        """Whether the run has written everything, and it is all there."""
+        try:
+            return self.marked_finished() and not self.lost()
+        except UserError:
+            return False
+
+    def marked_finished(self) -> bool:
+        """Whether the run has written everything; some of it may be lost.
+
+        Raises:
+            UserError: as `provenance_fields`.
+        """
         return bool(self.provenance_fields().get("finished"))
+
+    def lost(self) -> list[str]:
+        """What of a finished run is missing or damaged, a text for each file.
+
+        Pictures are missed only where they can be drawn again: copies of a run go
+        without them and without the checkpoint.
+        """
+        asked = self.kept
+        if files.is_file(self.checkpoint):
+            asked += self.pictures
+        lost = {
+            path.name: f"{path.name} is missing"
+            for path in asked
+            # a file of no bytes is what some disks leave of one after a power cut
+            if not files.is_file(path) or not path.stat().st_size
+        }
+        for path, read in (
+            (self.history, read_history),
+            (self.best_individuals, files.read_arrays),
+            (self.champion, read_champion),
+        ):
+            try:
+                if path.name not in lost:
+                    read(path)
+            except UserError as error:
+                lost[path.name] = str(error)
+        return list(lost.values())
 
     def mark_finished(self) -> None:
         """Write the time at which the run was finished."""
@@ -266,7 +314,4 @@ class RunDirectory:
         """
         if not files.is_file(self.provenance):
             return {}
-        fields = read_json(self.provenance)
-        if not isinstance(fields.get("resumed", []), list):
-            raise UserError(f"'{self.provenance}' is damaged: 'resumed' is not a list")
-        return fields
+        return read_provenance(self.provenance)

@@ -11,7 +11,8 @@ from epuck_mj.host.files import writing
 from evolution.judging.held_out import Judges
 from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
-from evolution.run.generation_loop import Evolution, Record
+from evolution.run.generation_loop import Evolution
+from evolution.run.history import Record
 from evolution.run.means import Means
 from evolution.run.provenance import provenance
 from evolution.run.results import Stage, silent, write_results

@@ -5,7 +5,7 @@ result. Randomness is keyed by what it is for: `random_generator(seed, purpose, 
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.disturbances import Disturbances
 from evolution.judging.evaluation import BatchEngine, DmControlEngine, Engine, evaluate
+from evolution.run.history import Record, history_text
 from evolution.search.table import Optimizer, make_optimizer
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.randomness import Purpose, disturbances, random_generator
@@ -22,38 +23,8 @@ from evolution.settings.randomness import Purpose, disturbances, random_generato
 ENGINES = ("batch", "dm_control")
 
 
-@dataclass(frozen=True)
-class Record:
-    """Record of one generation: fitness, then cost.
-
-    Attributes:
-        generation: counted from 0, the initial population.
-        evaluations: individuals evaluated so far.
-        best: highest stored fitness of the population.
-        mean: mean stored fitness of the population.
-        std: its standard deviation.
-        control_steps: of all its trials together; racing makes them fewer.
-        crash_rate: share of its trials that ended in a crash; racing breaks some off
-            before they can.
-        climbed: whether its trials were on wheels in MuJoCo, after others that were
-            not.
-    """
-
-    generation: int
-    evaluations: int
-    best: float
-    mean: float
-    std: float
-    control_steps: int
-    crash_rate: float
-    climbed: bool = False
-
-
 ARRAYS = {"records": len(Record.__dataclass_fields__), "best_genomes": None}
 """Arrays of a state, one row per generation, and their columns (None: genes)."""
-
-HISTORY: tuple[str, ...] = ("generation", "evaluations", "best", "mean", "std")
-"""Columns of history.csv, before the robot: racing changes none of them."""
 
 EngineMaker = Callable[[Scene], Engine]
 """Makes the engine for a scene; its `str` is what the provenance calls it."""
@@ -139,16 +110,18 @@ class Evolution:
         while not self.finished:
             yield self._generation()
 
+    def climb(self) -> None:
+        """Run the trials from now on on wheels."""
+        self.engine = self._maker(self._wheels)
+
     def _generation(self) -> Record:
         config = self.config
         generation = self.optimizer.generation
-        # the same starts for every individual, and for every algorithm of that seed
-        rng = random_generator(config.seed, Purpose.STARTS, generation)
-        starts = self.space.sample(rng, config.trials)
-        met, climbs = self._disturbances(generation), self._climbs_now
+        starts, met = self.trials(generation)
+        climbs = self._climbs_now
         spent, evaluations = self.evaluations, []
         if climbs:
-            self.engine = self._maker(self._wheels)
+            self.climb()
             known = self.optimizer.population
             anew = evaluate(self.engine, config.topology, known, starts, None, met)
             self.optimizer.judge_anew(anew.fitness)
@@ -177,11 +150,15 @@ class Evolution:
         self.best_genomes.append(self.optimizer.population[fitness.argmax()].copy())
         return record
 
-    def _disturbances(self, generation: int) -> Disturbances | None:
-        """Disturbances of a generation's trials, the same for every individual."""
+    def trials(self, generation: int) -> tuple[np.ndarray, Disturbances | None]:
+        """Starts `(trials, 3)` of a generation, and disturbances unless they are ideal.
+
+        The same for every individual, and for every algorithm of that seed.
+        """
         config, key = self.config, (Purpose.STARTS, generation)
         n, steps, seed = config.trials, config.steps, config.seed
-        return disturbances(config.conditions, n, steps, seed, *key)
+        starts = self.space.sample(random_generator(seed, *key), n)
+        return starts, disturbances(config.conditions, n, steps, seed, *key)
 
     def state(self) -> dict[str, np.ndarray]:
         """State from which evolution resumes, with the records so far."""
@@ -214,7 +191,7 @@ class Evolution:
         self.records = records
         self.best_genomes = list(genomes)
         if self.climbed:
-            self.engine = self._maker(self._wheels)
+            self.climb()
 
     def _array(self, state: Mapping[str, np.ndarray], name: str) -> np.ndarray:
         """A float array of a state, one row per generation told."""
@@ -231,13 +208,8 @@ class Evolution:
         return array
 
     def history(self) -> str:
-        """Text of history.csv, without times, with floats that read back exactly."""
-        rows = [
-            ",".join([*(repr(getattr(record, name)) for name in HISTORY), robot])
-            for record in self.records
-            for robot in [WHEELED_ROBOT if record.climbed else self.scene.name]
-        ]
-        return "\n".join([",".join([*HISTORY, "robot"]), *rows]) + "\n"
+        """Text of history.csv."""
+        return history_text(self.records, self.scene.name)
 
 
 def _optimizer(config: ExperimentConfig) -> Optimizer:

@@ -27,7 +27,8 @@ from evolution.judging.held_out_starts import (
     held_out_disturbances,
     starts_for_test,
 )
-from evolution.run.generation_loop import Evolution, Record
+from evolution.run.generation_loop import Evolution
+from evolution.run.history import Record
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.randomness import Purpose
 

@@ -10,6 +10,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pydantic import BaseModel, ValidationError
+
+from epuck_mj.errors import UserError
+from epuck_mj.host.yaml_and_json import read_json
+
 if TYPE_CHECKING:
     from epuck_mj.scene.model import Scene
 
@@ -44,6 +49,45 @@ def provenance(
         "started": now(),
         "finished": None,
     }
+
+
+class _Git(BaseModel, frozen=True, strict=True):
+    commit: str
+    modified: bool
+
+
+class _Processor(BaseModel, frozen=True, strict=True):
+    model: str | None = None
+    flags: list[str] = []
+
+
+class _Provenance(BaseModel, frozen=True, strict=True):
+    """What a provenance file says, if it says it."""
+
+    argv: list[str] = []
+    versions: dict[str, str] = {}
+    git: _Git | None = None
+    mjcf_sha256: dict[str, str] = {}
+    own_sha256: dict[str, str] = {}
+    processor: _Processor = _Processor()
+    finished: str | None = None
+    resumed: list["_Provenance"] = []
+
+
+def read_provenance(path: Path) -> dict[str, Any]:
+    """What `provenance` gave, from a file; older files say less.
+
+    Raises:
+        UserError: if it cannot be read, or a value is something else.
+    """
+    fields = read_json(path)
+    try:
+        _Provenance.model_validate(fields)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise UserError(f"'{path}' is damaged: {where}: {first['msg']}") from None
+    return fields
 
 
 def now() -> str:

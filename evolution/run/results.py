@@ -3,22 +3,27 @@
 import itertools
 from collections.abc import Callable, Mapping
 
-import numpy as np
-
 from epuck_mj.host import files
 from epuck_mj.policies.file import ControllerFile, Origin
-from epuck_mj.scene.model import Scene
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.step.control import BatchPolicy
 from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.trials.recorder import record_trajectories
+from epuck_mj.trials.trajectory import Trajectory
 from evolution.judging.evaluation import BatchEngine
 from evolution.judging.held_out import Judge
 from evolution.judging.held_out_starts import held_out_disturbances
 from evolution.judging.scores import Believed, Scores
-from evolution.run.champion import Champion, choose_champion, most_believed
+from evolution.run.champion import (
+    Champion,
+    Stored,
+    choose_champion,
+    most_believed,
+    stored_by,
+)
 from evolution.run.directory import RunDirectory
 from evolution.run.generation_loop import Evolution
+from evolution.settings.config import ExperimentConfig
 from evolution.settings.randomness import Purpose
 
 N_SHOWN = 4
@@ -28,7 +33,7 @@ Stage = Callable[[str, int, int], None]
 """Told what is done next, the number of that stage, and how many there are."""
 
 
-def silent(text: str, number: int, stages: int) -> None:
+def silent(text: str, number: int = 0, stages: int = 0) -> None:
     """A `Stage` that tells nobody."""
 
 
@@ -51,49 +56,76 @@ def write_results(
     Returns:
         The champion's scores, as written.
     """
+    config = evolution.config
+    stages = 4 + len(judges) * (1 if _met(config) is None else 2)
+    numbers = itertools.count()
+
+    def tell(text: str) -> None:
+        stage(text, next(numbers), stages)
+
+    stored = stored_by(evolution)
+    controller, scores = judged(evolution, stored, judges, threads, tell)
+    files.write_text(directory.champion, controller.to_json())
+    tell("Drawing the fitness")
+    _draw_fitness(evolution, directory)
+    tell("Recording the champion")
+    text = scores.in_lines(config.task.most)
+    _show(evolution, directory, controller.controller, judges[WHEELED_ROBOT], text)
+    return scores
+
+
+def judged(
+    evolution: Evolution,
+    stored: Stored,
+    judges: Mapping[str, Judge],
+    threads: int = 0,
+    tell: Callable[[str], None] = silent,
+) -> tuple[ControllerFile, Scores]:
+    """The champion of a run, chosen and tested, and its scores.
+
+    Args:
+        evolution: the run.
+        stored: what it stored.
+        judges: by robot, as of `Judges.tested_on`.
+        threads: that step the robots; 0 is one per core.
+        tell: told what is done next.
+    """
     config, n = evolution.config, evolution.config.test_starts
-    met = held_out_disturbances(config.conditions, Purpose.TEST, n, config.steps)
-    stages = 4 + len(judges) * (1 if met is None else 2)
-    number = itertools.count()
-    fresh = f"{config.validation_starts:,} fresh starts"
-    stage(f"Choosing the champion on {fresh}", next(number), stages)
+    met = _met(config)
+    tell(f"Choosing the champion on {config.validation_starts:,} fresh starts")
     engine, wheels = (
         BatchEngine(scene, config.task, threads)
         for scene in (evolution.scene, judges[WHEELED_ROBOT].scene)
     )
-    champion = choose_champion(engine, evolution, wheels)
+    champion = choose_champion(engine, evolution, stored, wheels)
     policy = config.topology.decode(champion.genome)
     held_out, as_evolved = {}, {}
     for robot, judge in judges.items():
         where = f"on {n:,} other starts, {robot}"
-        stage(f"Testing it {where}", next(number), stages)
+        tell(f"Testing it {where}")
         held_out[robot] = judge.test(policy, n)
         if met is not None:
-            stage(f"Testing it with disturbances {where}", next(number), stages)
+            tell(f"Testing it with disturbances {where}")
             as_evolved[robot] = judge.test(policy, n, met)
     # what the run believed its best to be, and what that is worth on an ideal robot
-    stage("Testing the individual of the highest fitness", next(number), stages)
-    genome, stored = most_believed(evolution)
-    believed = next(iter(judges.values())).test(config.topology.decode(genome), n)
+    tell("Testing the individual of the highest fitness")
+    genome, believed = most_believed(stored)
+    worth = next(iter(judges.values())).test(config.topology.decode(genome), n)
     scores = Scores(
         stored=champion.stored_fitness,
         validation=champion.validation_fitness,
         held_out=held_out,
-        most_believed=Believed(stored=stored, held_out=believed.mean),
+        most_believed=Believed(stored=believed, held_out=worth.mean),
     )
     if as_evolved:
         scores = scores.model_copy(update={"held_out_as_evolved": as_evolved})
-    controller = _controller_file(evolution, champion, scores)
-    files.write_text(directory.champion, controller.to_json())
-    stage("Drawing the fitness", next(number), stages)
-    _draw_fitness(evolution, directory)
-    stage("Recording the champion", next(number), stages)
-    wheeled = judges[WHEELED_ROBOT]
-    starts = wheeled.starts(N_SHOWN)
-    shown = None if met is None else met[:N_SHOWN]
-    text = scores.in_lines(config.task.most)
-    _show(evolution, directory, policy, wheeled.scene, starts, shown, text)
-    return scores
+    return _controller_file(evolution, champion, scores), scores
+
+
+def _met(config: ExperimentConfig) -> Disturbances | None:
+    """What the robots of the tests meet, if they are as in evolution."""
+    n, steps = config.test_starts, config.steps
+    return held_out_disturbances(config.conditions, Purpose.TEST, n, steps)
 
 
 def _controller_file(
@@ -131,22 +163,37 @@ def _draw_fitness(evolution: Evolution, directory: RunDirectory) -> None:
     save_figure(figure, directory.fitness_figure)
 
 
+def shown_trials(
+    evolution: Evolution, policy: BatchPolicy, judge: Judge, n: int = N_SHOWN
+) -> list[Trajectory]:
+    """The first trials of the champion's test, with the disturbances they met.
+
+    Args:
+        evolution: the run.
+        policy: its champion.
+        judge: of the robot that is shown.
+        n: number of trials.
+    """
+    met = _met(evolution.config)
+    met = None if met is None else met[:n]
+    starts, task = judge.starts(n), evolution.config.task
+    return record_trajectories(judge.scene, policy, starts, task, met)
+
+
 def _show(
     evolution: Evolution,
     directory: RunDirectory,
     policy: BatchPolicy,
-    scene: Scene,
-    starts: np.ndarray,
-    met: Disturbances | None,
+    judge: Judge,
     scores: str,
 ) -> None:
-    """Trials of the champion on the wheeled robot, with the disturbances they met."""
+    """Draw and record the champion's first trials."""
     from epuck_mj.show.figures import trajectory_figure
     from epuck_mj.show.pictures import save_figure
     from epuck_mj.show.recording import Trial, save_recording
 
-    task = evolution.config.task
-    trials = record_trajectories(scene, policy, starts, task, met)
+    task, scene = evolution.config.task, judge.scene
+    trials = shown_trials(evolution, policy, judge)
     titles = [
         f"start {i}: fitness {trial.trial_fitness:.0f}"
         for i, trial in enumerate(trials)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from epuck_mj.errors import UserError
 from evolution.settings.config import ExperimentConfig
 
 
@@ -12,6 +13,30 @@ def differing_keys(stored: ExperimentConfig, asked: ExperimentConfig) -> list[st
         f"{key} (stored {values.get('stored')}, got {values.get('asked')})"
         for key, values in differences({"stored": stored, "asked": asked}).items()
     ]
+
+
+def check_comparable(configs: Mapping[str, ExperimentConfig]) -> None:
+    """Refuse experiments whose runs could not stand in the tables of one report.
+
+    Other keys may differ: a report says which experiments it does not compare.
+
+    Args:
+        configs: by the experiments' names.
+
+    Raises:
+        UserError: naming the key that has to be the same, and all its values.
+    """
+    for key in COMPARABLE:
+        values = {name: getattr(config, key) for name, config in configs.items()}
+        if len(set(values.values())) > 1:
+            each = ", ".join(f"{name} {value}" for name, value in values.items())
+            raise UserError(
+                f"experiments of one study have to have the same {key}, got {each}"
+            )
+
+
+COMPARABLE = ("robot", "steps")
+"""Keys that the experiments of a study share."""
 
 
 def differences(

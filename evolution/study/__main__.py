@@ -6,6 +6,7 @@ import signal
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -17,10 +18,11 @@ from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse, shell_command, word
 from epuck_mj.host.interruption import Interrupted, Interruption
-from epuck_mj.policies.file import load_controller
+from epuck_mj.host.yaml_and_json import read_json
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
-from evolution.judging.scores import KnownScores, Scores
-from evolution.run.directory import RunDirectory, locked
+from evolution.judging.scores import KnownScores, read_champion
+from evolution.run.directory import RunDirectory
+from evolution.run.lock import locked
 from evolution.run.means import Means
 from evolution.study.config import StudyConfig, find_study, parse_seeds
 from evolution.study.directory import PATIENCE, StudyDirectory
@@ -102,7 +104,7 @@ def study(argv: Sequence[str]) -> int:
         for seed in seeds
         for name in config.experiments
     ]
-    jobs = [job for job in everything if not _finished(job, directory)]
+    jobs = [job for job in everything if not RunDirectory(job.directory).finished]
     started = time.monotonic()
     failed: list[Job] = []
     with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:
@@ -133,7 +135,9 @@ def study(argv: Sequence[str]) -> int:
 
 def _measure_yardstick(directory: StudyDirectory) -> None:
     """Test the hand-written wall follower as champions are, if that is not done yet."""
-    if directory.yardstick.exists():
+    path = directory.yardstick
+    with suppress(UserError):
+        KnownScores.read(read_json(path), path)
         return
     from evolution.judging.held_out import Judges
 
@@ -144,16 +148,7 @@ def _measure_yardstick(directory: StudyDirectory) -> None:
     # opening the study removes what looks left over
     with locked(directory.path, PATIENCE), files.writing():
         text = json.dumps(KnownScores(held_out=tests).to_dict(), indent=1) + "\n"
-        files.write_text(directory.yardstick, text)
-
-
-def _finished(job: Job, directory: StudyDirectory) -> bool:
-    """Whether a run is finished; False for a damaged directory, which fails later."""
-    run = directory.run(job.name, job.config.seed)
-    try:
-        return run.finished
-    except UserError:
-        return False
+        files.write_text(path, text)
 
 
 def _events(jobs: Sequence[Job], options: Options) -> Iterator[Event]:
@@ -211,8 +206,7 @@ def _shown(
 
 def _line(job: Job) -> str:
     """Line that shows the scores of a finished run."""
-    path = RunDirectory(job.directory).champion
-    scores = Scores.read(load_controller(path).scores, path)
+    _, scores = read_champion(RunDirectory(job.directory).champion)
     return f"{job}: {scores.in_short}"
 
 

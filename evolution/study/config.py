@@ -10,22 +10,37 @@ from typing import Self
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import find
 from epuck_mj.host.yaml_and_json import read_yaml, to_yaml
-from evolution.settings.comparison import differing_keys
+from evolution.settings.comparison import check_comparable, differing_keys
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config, shipped_with
 
 KEYS = ("experiments", "common")
+
+SEEDS = re.compile(r"(\d{1,18})(?:-(\d{1,18}))?", re.ASCII)
+
+SEEDS_MAX = 10_000
+"""Most seeds of one command."""
+
+SEEDS_OF_STUDY_MAX = 100_000
+"""Most seeds of an experiment, asked for by one command after the other."""
 
 
 @dataclass(frozen=True)
 class StudyConfig:
     """Experiments by name, in the order of every table and figure.
 
+    Raises:
+        UserError: if they cannot be compared.
+
     Attributes:
         experiments: the config of each, whose seed is not used.
     """
 
     experiments: Mapping[str, ExperimentConfig]
+
+    def __post_init__(self) -> None:
+        """Refuse experiments that no report can compare."""
+        check_comparable(self.experiments)
 
     @classmethod
     def load(cls, path: Path) -> Self:
@@ -126,11 +141,15 @@ def find_study(study: str) -> Path:
     return find(study, "study", shipped_with("experiments"), "a YAML")
 
 
-def parse_seeds(text: str) -> list[int]:
+def parse_seeds(text: str, most: int = SEEDS_MAX) -> list[int]:
     """Seeds of `1-30` or `1,3,5-8`, in ascending order.
 
+    Args:
+        text: of a person, or of `seeds_text`.
+        most: number of seeds that is allowed.
+
     Raises:
-        UserError: if it says anything else, or names a seed twice.
+        UserError: if it says anything else, names a seed twice, or too many.
     """
     seeds: list[int] = []
     for part in text.split(","):
@@ -138,11 +157,12 @@ def parse_seeds(text: str) -> list[int]:
         if ends is None:
             raise UserError(f"expected seeds as 1-30 or 1,3,5-8, got '{text}'")
         low, high = int(ends[1]), int(ends[2] or ends[1])
-        if not low <= high < low + SEEDS_MAX:
+        if not low <= high:
             raise UserError(
-                f"expected seeds from a lower to a higher one, at most {SEEDS_MAX}, "
-                f"got '{part}'"
+                f"expected seeds from a lower to a higher one, got '{part}'"
             )
+        if len(seeds) + high - low >= most:
+            raise UserError(f"expected at most {most} seeds, got '{text}'")
         seeds += range(low, high + 1)
     if len(set(seeds)) < len(seeds):
         raise UserError(f"expected every seed once, got '{text}'")
@@ -176,8 +196,10 @@ def seeds_from_yaml(path: Path) -> dict[str, list[int]]:
         UserError: if it is damaged.
     """
     stored = read_yaml(path)
-    return {str(name): parse_seeds(str(text)) for name, text in stored.items()}
-
-
-SEEDS = re.compile(r"(\d{1,18})(?:-(\d{1,18}))?", re.ASCII)
-SEEDS_MAX = 10_000
+    try:
+        return {
+            str(name): parse_seeds(str(text), SEEDS_OF_STUDY_MAX)
+            for name, text in stored.items()
+        }
+    except UserError as error:
+        raise UserError(f"'{path}': {error}") from None

@@ -9,12 +9,14 @@ import numpy as np
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
+from epuck_mj.host.command_line import shell_command
 from epuck_mj.host.yaml_and_json import read_json
-from epuck_mj.policies.file import ControllerFile, load_controller
+from epuck_mj.policies.file import ControllerFile
 from epuck_mj.policies.wall_follower import YARDSTICK
-from evolution.judging.scores import HeldOut, KnownScores, Scores
+from evolution.judging.held_out import tested_on
+from evolution.judging.scores import HeldOut, KnownScores, Scores, read_champion
 from evolution.run.directory import RunDirectory
-from evolution.run.generation_loop import HISTORY
+from evolution.run.history import read_history
 from evolution.settings.comparison import differing_keys
 from evolution.settings.config import ExperimentConfig
 from evolution.study.config import seeds_text
@@ -104,8 +106,7 @@ def load_study(path: Path) -> StudyData:
     """Read the finished and valid runs of a study directory.
 
     Raises:
-        UserError: if it is not a study, has no finished run, or mixes trials of
-            different length or robots.
+        UserError: if it is not a study that can be compared, or has no finished run.
     """
     directory = StudyDirectory(path)
     config = directory.stored_config()
@@ -131,17 +132,10 @@ def load_study(path: Path) -> StudyData:
         said = "; ".join([*missing[:3], "..."] if len(missing) > 3 else missing)
         raise UserError(f"no finished run in '{path}': {said}")
     missing += _unpaired({n: each for n, each in runs.items() if n not in asked})
-    robots = {tuple(run.scores.held_out) for run in everything}
-    steps = {run.champion.task.steps for run in everything}
-    if len(robots) > 1 or len(steps) > 1:
-        raise UserError(
-            f"expected runs on the same robots and as many steps in '{path}', got "
-            f"robots {sorted(robots)} and steps {sorted(steps)}"
-        )
-    tested = robots.pop()
     yardstick: Mapping[str, HeldOut] = {}
     configs = config.experiments
     first, *others = configs
+    tested = _tested_on(configs[first])
     differing = [n for n in others if configs[n].setting != configs[first].setting]
     if differing:
         missing.append(
@@ -164,7 +158,7 @@ def load_study(path: Path) -> StudyData:
         configs=configs,
         runs=runs,
         robots=tested,
-        steps=steps.pop(),
+        steps=configs[first].steps,
         yardstick=yardstick,
         missing=tuple(missing),
     )
@@ -176,37 +170,36 @@ def _run(directory: RunDirectory, config: ExperimentConfig, seed: int) -> RunDat
     Raises:
         UserError: if it is not finished, damaged, or of another config.
     """
-    if not directory.finished:
+    if not directory.marked_finished():
         raise UserError("not finished")
+    lost = "; ".join(directory.lost())
+    if lost and files.is_file(directory.checkpoint):
+        again = shell_command("evolution.run", "--resume", directory.path)
+        raise UserError(f"incomplete: {lost}; to write it again: {again}")
+    if lost:
+        raise UserError(f"incomplete: {lost}")
     stored = directory.stored_config()
     differing = differing_keys(stored, config.model_copy(update={"seed": seed}))
     if differing:
         raise UserError(f"of another config: {', '.join(differing)}")
-    champion = load_controller(directory.champion)
-    scores = Scores.read(champion.scores, directory.champion)
+    champion, scores = read_champion(directory.champion)
+    # the report reads of the config what the champion's file says, too
+    if (champion.task, champion.network) != (config.task, config.topology):
+        raise UserError(f"'{directory.champion}' is of another task or network")
+    expected = _tested_on(config)
+    for tests in (scores.held_out, scores.held_out_as_evolved):
+        if tests and tuple(tests) != expected:
+            raise UserError(
+                f"'{directory.champion}': tested on {', '.join(tests)}, expected "
+                + ", ".join(expected)
+            )
     history = read_history(directory.history)
     return RunData(seed, history, champion, scores, directory.path)
 
 
-def read_history(path: Path) -> dict[str, np.ndarray]:
-    """The columns of a history.csv, `(generations,)` each.
-
-    Raises:
-        UserError: if it cannot be read, or is damaged.
-    """
-    text = files.read_text(path)
-    try:
-        header, *lines = text.splitlines()
-        rows = np.array([[float(x) for x in line.split(",")] for line in lines])
-        if header != ",".join(HISTORY) or rows.ndim != 2 or not len(rows):
-            raise ValueError(f"expected rows of {','.join(HISTORY)}")
-        columns = dict(zip(HISTORY, rows.T, strict=True))
-        spent = np.diff(columns["evaluations"], prepend=0)
-        if (spent <= 0).any() or not np.isfinite(rows).all():
-            raise ValueError("evaluations do not rise, or a value is not finite")
-    except ValueError as error:
-        raise UserError(f"'{path}' is damaged: {error}") from None
-    return columns
+def _tested_on(config: ExperimentConfig) -> tuple[str, ...]:
+    """Names of the robots on which champions are tested."""
+    return tuple(Path(robot).name for robot in tested_on(config.robot))
 
 
 def _unpaired(runs: Mapping[str, tuple[RunData, ...]]) -> list[str]:

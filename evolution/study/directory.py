@@ -5,8 +5,14 @@ from pathlib import Path
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from evolution.run.directory import LOCK, RunDirectory, locked
-from evolution.study.config import StudyConfig, seeds_from_yaml, seeds_to_yaml
+from evolution.run.directory import RunDirectory
+from evolution.run.lock import LOCK, locked
+from evolution.study.config import (
+    SEEDS_OF_STUDY_MAX,
+    StudyConfig,
+    seeds_from_yaml,
+    seeds_to_yaml,
+)
 
 PREFIX = "seed-"
 
@@ -14,20 +20,25 @@ PATIENCE = 10.0
 """How long to wait for another process that opens the same study [s]."""
 
 
-def champions(place: Path) -> list[Path]:
-    """Champion files of the run or of all runs of the study at a path."""
+def runs_at(place: Path) -> list[RunDirectory]:
+    """The run at a path, or all runs of the study there, finished or not."""
     if not files.is_directory(place):
         return []
     run = RunDirectory(place)
-    if files.is_file(run.champion):
-        return [run.champion]
+    if run.begun or files.is_file(run.champion):
+        return [run]
     study = StudyDirectory(place)
     return [
-        path
+        study.run(name, seed)
         for name in sorted(each.name for each in place.iterdir() if each.is_dir())
         for seed in study.seeds(name)
-        if files.is_file(path := study.run(name, seed).champion)
     ]
+
+
+def champions(place: Path) -> list[Path]:
+    """Champion files of the run or of all runs of the study at a path."""
+    found = (run.champion for run in runs_at(place))
+    return [path for path in found if files.is_file(path)]
 
 
 class StudyDirectory:
@@ -86,6 +97,11 @@ class StudyDirectory:
                     asked = {n: there for n in begun if (there := self.seeds(n))}
                 for name in config.experiments:
                     asked[name] = sorted({*asked.get(name, ()), *seeds})
+                    if len(asked[name]) > SEEDS_OF_STUDY_MAX:
+                        raise UserError(
+                            f"expected at most {SEEDS_OF_STUDY_MAX} seeds in "
+                            f"'{self.path}', got {len(asked[name])} of {name}"
+                        )
                 if files.is_file(self.config):
                     config = self.stored_config().merged(config, self.path)
                 files.write_text(self.config, config.to_yaml())

@@ -17,6 +17,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
 from epuck_mj.errors import UserError
+from epuck_mj.host.hardship import hardship
 from epuck_mj.host.interruption import deaf_to_interrupts
 from evolution.run.directory import RunDirectory
 from evolution.run.means import Means
@@ -91,13 +92,14 @@ def generations(job: Job, means: Means) -> Generator[int]:
 
     directory = RunDirectory(job.directory)
     with directory.locked(PATIENCE):
-        if directory.config.exists():
+        begun = directory.begun
+        if begun:
             directory.refuse_other_config(job.config)
         # another process may have done it since the jobs were listed
         if directory.finished:
             return
         run = Run(job.config, directory, means, job.argv)
-        if directory.config.exists():
+        if begun:
             run.resume()
         else:
             run.start()
@@ -189,6 +191,9 @@ def failure_of(job: Job, error: Exception) -> str:
     """Why a job failed, on one line; an unexpected error also leaves a log."""
     if isinstance(error, UserError):
         return str(error)
+    line = hardship(error)
+    if line is not None:
+        return line
     log = failure_log(job.directory)
     with suppress(OSError):
         log.write_text("".join(traceback.format_exception(error)), encoding="utf-8")

@@ -10,7 +10,6 @@ and `signals/*`; `summary`. Timelines: `sim_time` since the start, and `step`.
 """
 
 import hashlib
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -62,26 +61,28 @@ def save_recording(
     """
     probe = ClearanceProbe(scene, 1)
     places = entities([trial.name for trial in trials])
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, "recording.rrd")
-        with rr.RecordingStream(
-            APPLICATION, recording_id=_identity(trials), send_properties=False
-        ) as stream:
-            stream.save(file, default_blueprint=blueprint(scene, trials, places))
-            stream.send_recording_name(title)
-            document = rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN)
-            stream.log("summary", document, static=True)
-            log_arena(stream, scene.model)
-            for trial, place in zip(trials, places, strict=True):
-                trajectory = trial.trajectory
-                log_robot(stream, scene.model, place)
-                log_motion(stream, scene, trajectory, trial.task.sensor_range, place)
-                clearance = probe.measure(trajectory.pose).distance
-                log_signals(stream, trajectory, clearance, place)
-        content = file.read_bytes() if file.exists() else b""
-    # rerun only warns when it is switched off
-    if not content:
-        raise UserError(f"cannot write '{path}': the variable RERUN switches rerun off")
+    with rr.RecordingStream(
+        APPLICATION, recording_id=_identity(trials), send_properties=False
+    ) as stream:
+        # rerun only warns when it is switched off
+        if not stream.is_enabled():
+            raise UserError(
+                f"cannot write '{path}': the variable RERUN switches rerun off"
+            )
+        # its own file could be written by halves
+        memory = stream.memory_recording()
+        stream.send_blueprint(blueprint(scene, trials, places), make_active=False)
+        stream.send_recording_name(title)
+        document = rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN)
+        stream.log("summary", document, static=True)
+        log_arena(stream, scene.model)
+        for trial, place in zip(trials, places, strict=True):
+            trajectory = trial.trajectory
+            log_robot(stream, scene.model, place)
+            log_motion(stream, scene, trajectory, trial.task.sensor_range, place)
+            clearance = probe.measure(trajectory.pose).distance
+            log_signals(stream, trajectory, clearance, place)
+        content = memory.drain_as_bytes()
     with writing():
         write_bytes(Path(path), content)
 

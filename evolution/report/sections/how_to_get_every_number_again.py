@@ -1,10 +1,8 @@
 """How to get every number again: files, commands, and where the runs came from."""
 
 import shlex
-from contextlib import suppress
 from typing import Any
 
-from epuck_mj.errors import UserError
 from epuck_mj.policies.wall_follower import YARDSTICK
 from evolution.pages.blocks import Block, Code, Heading, Listing, Paragraph, Table
 from evolution.pages.words import NOTHING, command_line, label
@@ -43,16 +41,11 @@ def origins(data: StudyData) -> dict[str, list[Any]]:
     found: dict[str, set[Any]] = {key: set() for key in ORIGINS}
     for runs in data.runs.values():
         for run in runs:
-            try:
-                fields = RunDirectory(run.path).provenance_fields()
-            except UserError:
-                continue
+            fields = RunDirectory(run.path).provenance_fields()
             for part in (fields, *fields.get("resumed", ())):
                 for key, read in ORIGINS.items():
-                    # what somebody has edited is left out
-                    with suppress(AttributeError, KeyError, TypeError):
-                        if part.get(key):
-                            found[key].add(read(part[key]))
+                    if part.get(key):
+                        found[key].add(read(part[key]))
     return {key: sorted(values) for key, values in found.items()}
 
 

@@ -86,7 +86,7 @@ def _refuse_foreign(directory: RunDirectory, job: Job) -> None:
     Raises:
         UserError: if it holds something else.
     """
-    if directory.config.exists():
+    if directory.begun:
         directory.refuse_other_config(job.config)
     else:
         directory.refuse_if_used()

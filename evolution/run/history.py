@@ -1,0 +1,145 @@
+"""Histories of a run: history.csv, best_individuals.npz and timing.csv."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from epuck_mj.errors import UserError
+from epuck_mj.host import files
+from epuck_mj.scene.model_files import WHEELED_ROBOT
+
+
+@dataclass(frozen=True)
+class Record:
+    """Record of one generation: fitness, then cost.
+
+    Attributes:
+        generation: counted from 0, the initial population.
+        evaluations: individuals evaluated so far.
+        best: highest stored fitness of the population.
+        mean: mean stored fitness of the population.
+        std: its standard deviation.
+        control_steps: of all its trials together; racing makes them fewer.
+        crash_rate: share of its trials that ended in a crash; racing breaks some off
+            before they can.
+        climbed: whether its trials were on wheels in MuJoCo, after others that were
+            not.
+    """
+
+    generation: int
+    evaluations: int
+    best: float
+    mean: float
+    std: float
+    control_steps: int
+    crash_rate: float
+    climbed: bool = False
+
+
+HISTORY: tuple[str, ...] = ("generation", "evaluations", "best", "mean", "std")
+"""Columns of history.csv with numbers: racing changes none of them."""
+
+ROBOT, CLIMBED = "robot", "climbed"
+"""The column after these: on which robot the trials were; and what is read of it."""
+
+
+def history_text(records: Sequence[Record], robot: str) -> str:
+    """Text of history.csv, without times, with floats that read back exactly.
+
+    Args:
+        records: of all generations.
+        robot: with which the run began.
+    """
+    rows = [
+        ",".join([*(repr(getattr(record, name)) for name in HISTORY), name_of])
+        for record in records
+        for name_of in [WHEELED_ROBOT if record.climbed else robot]
+    ]
+    return "\n".join([",".join([*HISTORY, ROBOT]), *rows]) + "\n"
+
+
+def read_history(path: Path) -> dict[str, np.ndarray]:
+    """The columns of a history.csv, `(generations,)` each.
+
+    Instead of the robot, `climbed` is 1 where it is another than at first, else 0.
+
+    Raises:
+        UserError: if it cannot be read, or is damaged.
+    """
+    text = files.read_text(path)
+    try:
+        header, *lines = text.splitlines() or [""]
+        known = [",".join(HISTORY), ",".join([*HISTORY, ROBOT])]
+        n, texts = len(HISTORY), [line.split(",") for line in lines]
+        rows = np.array([[float(x) for x in text[:n]] for text in texts])
+        if header not in known or rows.ndim != 2 or not len(rows):
+            raise ValueError(f"expected rows of {','.join(HISTORY)}")
+        columns = dict(zip(HISTORY, rows.T, strict=True))
+        others = [text[n:] != texts[0][n:] for text in texts]
+        columns[CLIMBED] = np.array(others, float)
+        spent = np.diff(columns["evaluations"], prepend=0)
+        if (spent <= 0).any() or not np.isfinite(rows).all():
+            raise ValueError("evaluations do not rise, or a value is not finite")
+    except ValueError as error:
+        raise UserError(f"'{path}' is damaged: {error}") from None
+    return columns
+
+
+def read_best_individuals(path: Path, n_genes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Genomes `(generations, n_genes)` and fitness `(generations,)` of the best.
+
+    Raises:
+        UserError: if they cannot be read, or are something else.
+    """
+    best = files.read_arrays(path)
+    genomes, fitness = (best.get(name, np.empty(0)) for name in ("genomes", "fitness"))
+    n = fitness.size
+    if not n or fitness.shape != (n,) or genomes.shape != (n, n_genes):
+        raise UserError(
+            f"'{path}': expected genomes (generations, {n_genes}) and fitness "
+            f"(generations,), got {genomes.shape} and {fitness.shape}"
+        )
+    for array in (genomes, fitness):
+        if array.dtype != float or not np.isfinite(array).all():
+            raise UserError(f"'{path}': expected finite numbers")
+    return genomes, fitness
+
+
+def timing_text(
+    records: Sequence[Record], seconds: Sequence[float], before: Path
+) -> str:
+    """Text of timing.csv; seconds are empty where a kill lost them.
+
+    Args:
+        records: of all generations.
+        seconds: that each of the last generations took.
+        before: the file so far, which knows the others' seconds.
+    """
+    taken: dict[int, str] = {}
+    if files.is_file(before):
+        columns = csv_columns(before.read_text(encoding="utf-8", errors="replace"))
+        numbers, each = (columns.get(name, []) for name in ("generation", "seconds"))
+        for number, text in zip(numbers, each, strict=False):
+            # a row that was cut off says nothing
+            with suppress(ValueError):
+                taken[int(number)] = f"{float(text):.3f}"
+    first = len(records) - len(seconds)
+    taken |= {first + i: f"{each:.3f}" for i, each in enumerate(seconds)}
+    lines = [
+        f"{record.generation},{taken.get(record.generation, '')},"
+        f"{record.control_steps},{record.crash_rate:.4f}\n"
+        for record in records
+    ]
+    return "".join(["generation,seconds,control_steps,crash_rate\n", *lines])
+
+
+def csv_columns(text: str) -> dict[str, list[str]]:
+    """Columns of a text of comma-separated values, by name; empty what a row lacks."""
+    header, *rows = [line.split(",") for line in text.splitlines()] or [[]]
+    return {
+        name: [row[i] if i < len(row) else "" for row in rows]
+        for i, name in enumerate(header)
+    }

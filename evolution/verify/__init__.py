@@ -1,0 +1,1 @@
+"""Runs compared with what they were made from: `python -m evolution.verify`."""

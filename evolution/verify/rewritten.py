@@ -1,0 +1,177 @@
+"""What a run would write now, compared with what is written.
+
+With its checkpoint, a run writes all its results again. A copy without one has its
+first generations, which everything random in the config decides, and of the final
+population only the champion: whatever of it can be made again is compared.
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from epuck_mj.host.own_parts import is_own
+from epuck_mj.scene.model_files import WHEELED_ROBOT
+from evolution.judging.evaluation import evaluate
+from evolution.judging.held_out import Judges
+from evolution.run.champion import Stored, stored_by
+from evolution.run.generation_loop import Evolution
+from evolution.run.history import CLIMBED, HISTORY, Record, csv_columns, timing_text
+from evolution.run.results import judged, shown_trials
+from evolution.settings.comparison import flat
+from evolution.verify.differences import lines_of_differences, said, unsaid
+from evolution.verify.written import Written
+
+AGAIN = 2
+"""Generations that are run again: the initial population, and what is made of it."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Outcome of a comparison.
+
+    Attributes:
+        differing: lines about what would be written otherwise now.
+        unsaid: what the champion's file does not say, as older ones do.
+    """
+
+    differing: tuple[str, ...]
+    unsaid: tuple[str, ...]
+
+
+def compared(written: Written, judges: Judges, threads: int) -> Outcome:
+    """What is written, compared with what would be written now.
+
+    Raises:
+        UserError: if the run cannot be repeated here, or its checkpoint is no such.
+    """
+    evolution = Evolution(written.source, threads=threads)
+    lines = [*_made_of(written, evolution), *_evolved(written, evolution)]
+    if written.has_checkpoint:
+        stored = stored_by(evolution)
+    else:
+        lines += _histories(written, evolution)
+        stored = stored_without_checkpoint(written, evolution)
+    tested = judges.tested_on(evolution.config.robot, evolution.config.setting)
+    controller, _ = judged(evolution, stored, tested, threads)
+    now, name = json.loads(controller.to_json()), written.run.champion.name
+    known = said(now, written.champion)
+    lines += lines_of_differences(name, written.champion, known)
+    if written.trajectory is not None:
+        policy, judge = controller.controller, tested[WHEELED_ROBOT]
+        (shown,) = shown_trials(evolution, policy, judge, 1)
+        name, before = written.run.trajectory.name, _arrays(written.trajectory)
+        lines += lines_of_differences(name, before, _arrays(shown))
+    # the first generations are compared twice
+    return Outcome(tuple(dict.fromkeys(lines)), tuple(unsaid(now, written.champion)))
+
+
+def _made_of(written: Written, evolution: Evolution) -> Iterator[str]:
+    """Lines about the config and the models."""
+    run, config = written.run, written.source
+    yield from lines_of_differences(run.config.name, flat(written.config), flat(config))
+    now = {
+        "mjcf_sha256": dict(evolution.scene.sha256),
+        "own_sha256": config.own_parts,
+    }
+    before = {key: written.provenance.get(key, {}) for key in now}
+    yield from lines_of_differences(run.provenance.name, before, now)
+
+
+def _evolved(written: Written, evolution: Evolution) -> Iterator[str]:
+    """Lines about the histories: of the beginning, and of all if there is a checkpoint.
+
+    The evolution is at the end of the run then.
+    """
+    run = written.run
+    list(islice(evolution.run(), AGAIN))
+    yield from _generations(written, evolution, len(evolution.records))
+    if written.has_checkpoint:
+        run.restore_checkpoint(evolution)
+        yield from _generations(written, evolution, None)
+        now = csv_columns(timing_text(evolution.records, (), run.timing))
+        yield from lines_of_differences(run.timing.name, written.timing, now)
+
+
+def _generations(
+    written: Written, evolution: Evolution, n: int | None
+) -> Iterator[str]:
+    """Lines about the first `n` generations, or all of them."""
+    run, records = written.run, evolution.records
+    before = {name: values[:n].tolist() for name, values in written.history.items()}
+    yield from lines_of_differences(run.history.name, before, _columns(records))
+    genomes, fitness = (array[:n].tolist() for array in written.best)
+    yield from lines_of_differences(
+        run.best_individuals.name,
+        {"genomes": genomes, "fitness": fitness},
+        {
+            "genomes": np.array(evolution.best_genomes).tolist(),
+            "fitness": [record.best for record in records],
+        },
+    )
+
+
+def _columns(records: list[Record]) -> dict[str, list[float]]:
+    """Columns of history.csv."""
+    names = [*HISTORY, CLIMBED]
+    return {name: [float(getattr(r, name)) for r in records] for name in names}
+
+
+def _histories(written: Written, evolution: Evolution) -> Iterator[str]:
+    """Lines about the histories of a run without checkpoint."""
+    name = written.run.best_individuals.name
+    fitness, best = written.best[1].tolist(), written.history["best"].tolist()
+    yield from lines_of_differences(name, {"fitness": fitness}, {"fitness": best})
+    spent, config = int(written.history["evaluations"][-1]), evolution.config
+    # an own optimiser's generations may differ in size
+    own = is_own(config.optimizer.algorithm)
+    left = config.evaluations - spent
+    # to climb, the population would have been evaluated anew
+    needed = evolution.optimizer.next_size() * (2 if config.climbs else 1)
+    if left < 0 or not (own or left < needed):
+        yield (
+            f"{written.run.config.name}: evaluations {config.evaluations}, but "
+            f"{written.run.history.name} ends with {spent}"
+        )
+
+
+def stored_without_checkpoint(written: Written, evolution: Evolution) -> Stored:
+    """What a run without checkpoint stored; of its population, the champion only."""
+    # of a run that has climbed, what was stored since then
+    climbed = written.history[CLIMBED]
+    first = int(climbed.argmax())
+    if climbed.any():
+        evolution.climb()
+    genomes, fitness = (array[first:] for array in written.best)
+    genome, believed = written.controller.genome, written.champion["scores"]["stored"]
+    if genome.size != genomes.shape[1]:
+        nobody = np.empty((0, genomes.shape[1])), np.empty(0)
+        return Stored(*nobody, genomes, fitness)
+    # it was the best of some generations, or it earned in one what it is believed
+    as_best = fitness[(genomes == genome).all(axis=1)]
+    # an own optimiser may store what it likes
+    own = is_own(evolution.config.optimizer.algorithm)
+    if believed not in as_best and not own:
+        generations = range(first, first + len(fitness))
+        earned = _earned(evolution, genome, generations)
+        if believed not in earned:
+            believed = as_best[-1] if as_best.size else earned.max()
+    return Stored(genome[None], np.array([believed]), genomes, fitness)
+
+
+def _earned(evolution: Evolution, genome: np.ndarray, generations: range) -> np.ndarray:
+    """What a genome earns on the trials of each generation, `(generations,)`."""
+    engine, topology = evolution.engine, evolution.config.topology
+    each = [
+        evaluate(engine, topology, genome[None], starts, disturbances=met).fitness
+        for starts, met in map(evolution.trials, generations)
+    ]
+    return np.concatenate(each)
+
+
+def _arrays(content: Any) -> Mapping[str, Any]:
+    """The arrays of a dataclass as lists."""
+    return {f.name: getattr(content, f.name).tolist() for f in fields(content)}
