@@ -11,9 +11,8 @@ from filelock import FileLock, Timeout
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.host.yaml_and_json import read_json
 from epuck_mj.policies.file import CHAMPION
-from evolution.run.provenance import now, to_json
+from evolution.run.provenance import now, read_provenance, to_json
 from evolution.settings.comparison import differing_keys
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import load_config
@@ -266,7 +265,4 @@ class RunDirectory:
         """
         if not files.is_file(self.provenance):
             return {}
-        fields = read_json(self.provenance)
-        if not isinstance(fields.get("resumed", []), list):
-            raise UserError(f"'{self.provenance}' is damaged: 'resumed' is not a list")
-        return fields
+        return read_provenance(self.provenance)

@@ -10,6 +10,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pydantic import BaseModel, ValidationError
+
+from epuck_mj.errors import UserError
+from epuck_mj.host.yaml_and_json import read_json
+
 if TYPE_CHECKING:
     from epuck_mj.scene.model import Scene
 
@@ -44,6 +49,48 @@ def provenance(
         "started": now(),
         "finished": None,
     }
+
+
+class _Processor(BaseModel, strict=True):
+    model: str | None = None
+    flags: list[str] = []
+
+
+class _Git(BaseModel, strict=True):
+    commit: str
+    modified: bool
+
+
+class _Stored(BaseModel, strict=True):
+    """What is used of a stored provenance; all may be missing, as in older files."""
+
+    argv: list[str] = []
+    versions: dict[str, str] = {}
+    git: _Git | None = None
+    mjcf_sha256: dict[str, str] = {}
+    own_sha256: dict[str, str] = {}
+    processor: _Processor | None = None
+    finished: str | None = None
+
+
+class _WithResumed(_Stored):
+    resumed: list[_Stored] = []
+
+
+def read_provenance(path: Path) -> dict[str, Any]:
+    """The stored provenance of a run, as JSON values.
+
+    Raises:
+        UserError: if it cannot be read, or is damaged.
+    """
+    fields = read_json(path)
+    try:
+        _WithResumed.model_validate(fields)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise UserError(f"'{path}' is damaged: {where}: {first['msg']}") from None
+    return fields
 
 
 def now() -> str:

@@ -188,13 +188,17 @@ def _run(directory: RunDirectory, config: ExperimentConfig, seed: int) -> RunDat
     return RunData(seed, history, champion, scores, directory.path)
 
 
+HISTORY_MAX = 250_000_000
+"""Most bytes of a history.csv: some millions of generations."""
+
+
 def read_history(path: Path) -> dict[str, np.ndarray]:
     """The columns of a history.csv, `(generations,)` each.
 
     Raises:
         UserError: if it cannot be read, or is damaged.
     """
-    text = files.read_text(path)
+    text = files.read_text(path, HISTORY_MAX)
     try:
         header, *lines = text.splitlines()
         rows = np.array([[float(x) for x in line.split(",")] for line in lines])
