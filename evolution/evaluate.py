@@ -9,15 +9,15 @@ from typing import Annotated
 
 import tyro
 
-from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import check_threads, main, parse, word
+from epuck_mj.host.limits import check_flag
 from epuck_mj.step.conditions import ConditionFlags, Conditions
 from epuck_mj.step.disturbances import Disturbances
 from evolution.judging.held_out_starts import held_out_disturbances
 from evolution.judging.scores import HeldOut
 from evolution.named_policies import policies_of
-from evolution.settings.config_fields import N_TEST, STARTS_MAX
+from evolution.settings.config_fields import N_TEST
 from evolution.settings.randomness import Purpose
 from evolution.settings.setting import Setting
 
@@ -61,8 +61,7 @@ class Options:
 def evaluate_policies(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
-    if not 2 <= options.starts <= STARTS_MAX:
-        raise UserError(f"expected 2 to {STARTS_MAX} starts, got {options.starts}")
+    check_flag("starts", options.starts)
     check_threads(options.threads)
     candidates = policies_of(options.paths, options.generations)
     conditions = options.robots.conditions or Conditions()

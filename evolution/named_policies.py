@@ -128,7 +128,7 @@ def _champion(path: Path, name: str, config: ExperimentConfig | None) -> NamedPo
         file.origin.robot,
         file.origin.arena,
         clearance,
-        KnownScores.found_in(file.scores),
+        KnownScores.read(file.scores, path),
         config,
     )
 

@@ -63,10 +63,13 @@ FIRST_START = 26
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"population": 3}, "^population: expected at least 4 for two .*, got 3$"),
-        ({"sigma": 0.0}, "^sigma: expected a number above 0, got 0.0$"),
-        ({"sigma": np.nan}, "^sigma: expected a number above 0, got nan$"),
-        ({"sigma": np.inf}, "^sigma: expected a number above 0, got inf$"),
+        (
+            {"population": 3},
+            "^population: expected a whole number from 4 to 100,000, got 3$",
+        ),
+        ({"sigma": 0.0}, "^sigma: expected a number above 0, at most .*, got 0.0$"),
+        ({"sigma": np.nan}, "^sigma: expected a number above 0, at most .*, got nan$"),
+        ({"sigma": np.inf}, "^sigma: expected a number above 0, at most .*, got inf$"),
         ({"sigma": 10.5}, "^sigma: expected at most 10, the width of .*, got 10.5$"),
     ],
 )

@@ -62,9 +62,16 @@ def test_an_unknown_command_is_one_line(capsys, monkeypatch, handlers):
         ("--strategy rand", "unknown option --strategy rand; see python -m evolution"),
         ("--seed abc", "--seed: expected a whole number, got 'abc'"),
         ("--control-step x", "--control-step: expected a number, got 'x'"),
-        ("--hidden 0", "hidden: expected at least 1, got 0"),
-        ("--v-max 0", "v_max: expected more than 0, got 0"),
-        ("--test-starts 1", "test_starts: expected at least 2, got 1"),
+        ("--hidden 0", "hidden: expected a whole number from 1 to 1,000, got 0"),
+        ("--v-max 0", "v_max: expected a number above 0, at most 0.13 m/s (sp"),
+        (
+            "--hidden 0 --v-max 0",
+            "v_max: expected a number above 0, at most 0.13 m/s (sp",
+        ),
+        (
+            "--test-starts 1",
+            "test_starts: expected a whole number from 2 to 100,000, got",
+        ),
     ],
 )
 def test_a_mistake_is_answered_with_what_to_do(flags, message):

@@ -45,12 +45,15 @@ def sphere(genomes: np.ndarray) -> np.ndarray:
     ("changes", "message"),
     [
         ({"strategy": "fast"}, "^unknown strategy 'fast'; available: best, rand$"),
-        ({"population": 3}, "^population: expected at least 4 .*, got 3$"),
-        ({"scale": -0.1}, r"^scale \(F\): expected 0 to 2, got -0.1$"),
-        ({"scale": 2.1}, r"^scale \(F\)"),
-        ({"scale": np.nan}, r"^scale \(F\)"),
-        ({"crossover": 1.1}, r"^crossover \(CR\): expected 0 to 1, got 1.1$"),
-        ({"crossover": -0.1}, r"^crossover \(CR\)"),
+        (
+            {"population": 3},
+            "^population: expected a whole number from 4 to 100,000, got 3$",
+        ),
+        ({"scale": -0.1}, "^scale: expected a number from 0 to 2, got -0.1$"),
+        ({"scale": 2.1}, "^scale: "),
+        ({"scale": np.nan}, "^scale: "),
+        ({"crossover": 1.1}, "^crossover: expected a number from 0 to 1, got 1.1$"),
+        ({"crossover": -0.1}, "^crossover: "),
         (
             {"bounds_rule": "wrap"},
             "^unknown bounds rule 'wrap'; "

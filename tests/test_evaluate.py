@@ -112,7 +112,10 @@ def test_another_arena(finished, tmp_path, capsys):
     [
         ([], "expected run or study directories"),
         (["nowhere"], "no champion in 'nowhere'"),
-        (["wall-follower", "--starts", "1"], "expected 2 to 100000 starts, got 1"),
+        (
+            ["wall-follower", "--starts", "1"],
+            "from 2 to 100,000, got 1",
+        ),
         (["wall-follower", "--robot", "r2d2"], "r2d2"),
         (["wall-follower", "--generations", "0"], "saved its generations"),
         (["."], "no champion in '.'"),

@@ -37,11 +37,14 @@ def sigma(optimizer: EvolutionStrategy) -> list[float]:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"lineages": 0}, "^lineages: expected at least 1, got 0$"),
-        ({"sigma": 0.0}, "^sigma: expected a number above 0, got 0.0$"),
-        ({"sigma": -1.0}, "^sigma: expected a number above 0, got -1.0$"),
-        ({"sigma": np.nan}, "^sigma: expected a number above 0, got nan$"),
-        ({"sigma": np.inf}, "^sigma: expected a number above 0, got inf$"),
+        (
+            {"lineages": 0},
+            "^lineages: expected a whole number from 1 to 100,000, got 0$",
+        ),
+        ({"sigma": 0.0}, "^sigma: expected a number above 0, at most .*, got 0.0$"),
+        ({"sigma": -1.0}, "^sigma: expected a number above 0, at most .*, got -1.0$"),
+        ({"sigma": np.nan}, "^sigma: expected a number above 0, at most .*, got nan$"),
+        ({"sigma": np.inf}, "^sigma: expected a number above 0, at most .*, got inf$"),
         ({"sigma": 10.5}, "^sigma: expected at most 10, the width of .*, got 10.5$"),
         (
             {"bounds_rule": "wrap"},

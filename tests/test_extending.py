@@ -284,7 +284,10 @@ class Needy:
         ("--network bad.py:Loud", "expected v from 0 to 1 and w from -1 to 1, got v 3"),
         ("--network bad.py:Flat", r"expected actions of shape \(20, 2\), got \(2,\)"),
         ("--network bad.py:Deaf", "expected a method 'act'"),
-        ("--network bad.py:Countless", "expected n_genes, a whole number from 1"),
+        (
+            "--network bad.py:Countless",
+            "n_genes: expected a whole number from 1 to 100,000, got",
+        ),
         ("--network bad.py:Needy", "failed .*with TypeError"),
         ("--optimizer swarm.py:SwarmParameters", "expected a subclass of evolution"),
         ("--optimizer swarm.py:Swarm --inertai 1", "inertai"),

@@ -315,8 +315,14 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
     [
         ([], "expected run or study directories"),
         (["nowhere"], "no champion in 'nowhere'"),
-        (["wall-follower", "--worlds", "1"], "2 to 1000 worlds, got 1"),
-        (["wall-follower", "--starts", "0"], "2 to 1000 starts, got 0"),
+        (
+            ["wall-follower", "--worlds", "1"],
+            "from 2 to 1,000, got 1",
+        ),
+        (
+            ["wall-follower", "--starts", "0"],
+            "from 2 to 1,000, got 0",
+        ),
         (["wall-follower", "--threads", "-1"], "threads"),
         (["wall-follower", "--robot", "tank"], "no robot 'tank'"),
     ],

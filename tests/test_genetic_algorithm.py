@@ -41,13 +41,19 @@ def chromosome(*genes: str) -> np.ndarray:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"population": 1}, "^population: expected at least 2, got 1$"),
-        ({"bits": 0}, "^bits: expected 1 to 32, got 0$"),
-        ({"bits": 33}, "^bits: expected 1 to 32, got 33$"),
-        ({"tournament": 0}, "^tournament: expected at least 1, got 0$"),
-        ({"crossover": 1.1}, "^crossover: expected 0 to 1, got 1.1$"),
-        ({"mutation": np.nan}, "^mutation: expected 0 to 1, got nan$"),
-        ({"elites": -1}, "^elites: expected 0 to population - 1 = 99, got -1$"),
+        (
+            {"population": 1},
+            "^population: expected a whole number from 2 to 100,000, got 1$",
+        ),
+        ({"bits": 0}, "^bits: expected a whole number from 1 to 32, got 0$"),
+        ({"bits": 33}, "^bits: expected a whole number from 1 to 32, got 33$"),
+        (
+            {"tournament": 0},
+            "^tournament: expected a whole number from 1 to 10,000, got 0$",
+        ),
+        ({"crossover": 1.1}, "^crossover: expected a number from 0 to 1, got 1.1$"),
+        ({"mutation": np.nan}, "^mutation: expected a number from 0 to 1, got nan$"),
+        ({"elites": -1}, "^elites: expected a whole number from 0 to .*, got -1$"),
         ({"elites": 100}, "^elites: expected 0 to population - 1 = 99, got 100$"),
     ],
 )

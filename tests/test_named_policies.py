@@ -223,21 +223,23 @@ def test_what_is_known_of_a_policy_is_described(evolved, tmp_path):
     assert load_config(evolved / "config.yaml").to_yaml() in text
     held_out = {
         "epuck": {"mean": 212.25, "starts": 1000, "crash_rate": 0.125},
-        "damaged": {"mean": "no"},
-        "none": None,
     }
     text = described(of_a_person(tmp_path, {"held_out": held_out}))
     assert "- Held-out fitness, epuck: 212.2 over 1,000 starts, 12.5% crash" in text
-    assert "damaged" not in text
     assert "arena: round" in text
     assert "Stored" not in text
+
+
+@pytest.mark.parametrize("scores", [{}, {"note": "the best"}], ids=str)
+def test_of_unknown_scores_nothing_is_said(tmp_path, scores):
+    policy = of_a_person(tmp_path, scores)
+    assert policy.scores == KnownScores()
+    assert described(policy).startswith(f"## {policy.name}\n\n\n```\n")
 
 
 @pytest.mark.parametrize(
     "scores",
     [
-        {},
-        {"note": "the best"},
         {"stored": "no"},
         {"stored": None, "validation": True},
         {"stored": float("nan")},
@@ -248,14 +250,12 @@ def test_what_is_known_of_a_policy_is_described(evolved, tmp_path):
     ],
     ids=str,
 )
-def test_of_unknown_scores_nothing_is_said(tmp_path, scores):
-    policy = of_a_person(tmp_path, scores)
-    assert policy.scores == KnownScores()
-    assert described(policy).startswith(f"## {policy.name}\n\n\n```\n")
+def test_false_scores_are_refused(tmp_path, scores):
+    with pytest.raises(UserError, match=r"a\.json'"):
+        of_a_person(tmp_path, scores)
 
 
 def test_scores_that_are_known_are_said_beside_unknown_ones(tmp_path):
-    scores = {"stored": 240, "validation": "high", "most_believed": {}}
-    text = described(of_a_person(tmp_path, scores))
+    text = described(of_a_person(tmp_path, {"stored": 240}))
     assert "- Stored fitness, what evolution believed: 240.0\n" in text
     assert "validation" not in text

@@ -7,6 +7,7 @@ import scipy.stats
 
 from epuck_mj.constants import BODY_RADIUS
 from epuck_mj.errors import UserError
+from epuck_mj.host.limits import LIMITS
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace, survey
 
@@ -140,3 +141,10 @@ def test_scenes_that_are_compiled_alike_are_surveyed_once(tmp_path):
     assert smaller.inside.sum() < 0.8 * first.inside.sum()
     edited.model.geom_pos[edited.model.ngeom - 1, 0] += 0.1
     assert survey(edited, CLEARANCE) is not smaller
+
+
+def test_as_many_starts_as_are_allowed_are_found(planar):
+    """Not only those that a fixed number of candidates holds."""
+    n = LIMITS["starts"].most
+    starts = FreeSpace(planar, 0.01).sample(np.random.default_rng(0), n)
+    assert starts.shape == (n, 3)

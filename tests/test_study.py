@@ -335,7 +335,7 @@ def test_racing_changes_nothing(here, carried):
         (["nope", "--output", "out"], ("no study 'nope'", "paper")),
         (["one.yaml", "--output", "out"], ("unknown key 'steps'",)),
         (["mine.yaml", "--output", "out", "--seeds", "3-1"], ("'3-1'",)),
-        (["mine.yaml", "--output", "out", "--jobs", "-1"], ("0 to 1024, got -1",)),
+        (["mine.yaml", "--output", "out", "--jobs", "-1"], ("0 to 1,024, got -1",)),
         (["mine.yaml", "--output", "out", "--jobs", "many"], ("--jobs", "'many'")),
         (
             ["mine.yaml", "--output", "out", "--experiments", "one,three"],

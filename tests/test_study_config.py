@@ -117,10 +117,10 @@ def test_transfer_is_about_real_sensors_and_motors():
 
 def test_what_experiments_share_wins(here):
     (here / "mine.yaml").write_text("steps: 7\ntrials: 3\n" + GA)
-    config = study("experiments: [ga, mine.yaml]\ncommon: {steps: 9, seed: 4}")
+    config = study("experiments: [ga, mine.yaml]\ncommon: {steps: 9}")
     assert list(config.experiments) == ["ga", "mine"]
     shipped = load_config(find_config("ga")).model_dump()
-    assert config.experiments["ga"].model_dump() == shipped | {"steps": 9, "seed": 4}
+    assert config.experiments["ga"].model_dump() == shipped | {"steps": 9}
     assert (config.experiments["mine"].steps, config.experiments["mine"].trials) == (
         9,
         3,
@@ -158,14 +158,17 @@ def test_a_run_has_its_own_seed_and_nothing_else(here):
         ("experiment: [ga]", ("unknown key 'experiment'; available: experiments, c",)),
         ("{1: 2}", ("unknown key '1'",)),
         ("common: {steps: 3}", ("expected 'experiments', a list", "got None")),
-        ("experiments: ga", ("expected 'experiments', a list", "got ga")),
+        ("experiments: ga", ("expected 'experiments', a list", "got 'ga'")),
         ("experiments: []", ("expected 'experiments', a list", "got []")),
         ("experiments: [ga, nope]", ("no experiment 'nope'", "de-rand, ga")),
         ("experiments: [paper]", ("no experiment 'paper'",)),
         ("experiments: [study.yaml]", ("unknown key 'experiments'",)),
-        ("experiments: [3]", ("no experiment '3'",)),
+        ("experiments: [3]", ("a list of experiments, got [3]",)),
         ("experiments: [ga, ga]", ("two experiments are called 'ga'",)),
         ("experiments: [ga, ga.yaml]", ("two experiments are called 'ga'",)),
+        ("experiments: [ga]\ncommon: []", ("expected 'common', a mapping, got []",)),
+        ("experiments: [ga]\ncommon: {seed: 7}", ("'seed' has no effect here",)),
+        ("experiments: [ga]\nexperiments: [ga]", ("stands twice, in line 1 and 2",)),
         ("experiments: [ga]\ncommon: 3", ("expected 'common', a mapping, got 3",)),
         ("experiments: [ga]\ncommon: {stps: 3}", ("', common: unknown key 'stps'",)),
         ("experiments: [ga]\ncommon: {steps: x}", ("common: steps: ", "got 'x'")),

@@ -142,3 +142,57 @@ def test_given_starts_come_first():
 def test_unknown_tasks_are_refused():
     with pytest.raises(UserError, match="'follow_wall'; available: follow_walls"):
         epuck_mj.load("follow_wall")
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        [np.nan, 0.0],
+        [0.0, -np.inf],
+        [1e308, 1e308],
+        [1.0],
+        [[1.0, 0.0]],
+        [1.0, [0.0]],
+        ["1", "0"],
+        [None, 0.0],
+        [True, False],
+        [1j, 0.0],
+        [10**400, 0],
+        "forward",
+        None,
+    ],
+    ids=str,
+)
+def test_actions_that_are_no_numbers_are_refused(name, action):
+    env = make(name)
+    env.reset()
+    with pytest.raises(UserError, match=r"^expected an action of two finite "):
+        env.step(action)
+    # as if nothing had been
+    assert env.step(np.array([0.5, 0.0])).reward >= 0
+
+
+def test_actions_may_be_of_any_numbers(name):
+    rewards = []
+    for action in ([1, 0], (1.0, 0.0), np.array([1, 0], np.float32)):
+        env = make(name)
+        env.reset()
+        rewards.append(env.step(action).reward)
+    assert len(set(rewards)) == 1
+
+
+@pytest.mark.parametrize("random", ["abc", -1, 2**32, 1.5, True, [1, 2], "rng"])
+def test_what_random_may_be_is_one_line(name, random):
+    if random == "rng":
+        random = np.random.default_rng(1)
+    with pytest.raises(UserError) as error:
+        epuck_mj.load(name, {"random": random})
+    assert str(error.value).startswith(
+        "random: expected a whole number from 0 to 4,294,967,295 (or a "
+        "numpy.random.RandomState, or None), got "
+    )
+
+
+@pytest.mark.parametrize("random", [0, np.int64(3), np.random.RandomState(3), None])
+def test_random_is_a_seed_a_generator_or_nothing(name, random):
+    epuck_mj.load(name, {"random": random, "robot": "epuck_planar"}).reset()

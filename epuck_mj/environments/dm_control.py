@@ -22,6 +22,7 @@ from dm_env import specs
 
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
+from epuck_mj.host.limits import check, shown
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
@@ -105,6 +106,32 @@ def environment(
     )
 
 
+def _check_random(random: Any) -> None:
+    """Refuse what is neither a seed nor a generator as dm_control's suite has it."""
+    if random is None or isinstance(random, np.random.RandomState):
+        return
+    try:
+        check("random", int(random) if isinstance(random, np.integer) else random)
+    except ValueError as error:
+        raise UserError(str(error)) from None
+
+
+def _two_numbers(action: Any) -> np.ndarray:
+    """A copy of an action `(2,)`, as floats."""
+    try:
+        array = np.asarray(action)
+        if array.shape == (2,) and array.dtype.kind in "fiu":
+            for number in array.tolist():
+                check("action", number)
+            return array.astype(float)
+    except ValueError:
+        # also of lists of unlike lengths
+        pass
+    raise UserError(
+        f"expected an action of two finite numbers, v and w, got {shown(action)}"
+    )
+
+
 class FollowWalls(base.Task):
     """Drive fast, straight and close to a wall; a crash ends the episode."""
 
@@ -124,7 +151,11 @@ class FollowWalls(base.Task):
             space: where random starts are drawn, once `starts` are used up.
             starts: poses `(3,)` of the first episodes: x, y [m], yaw [rad].
             random: seed of the random starts, or a generator to draw them from.
+
+        Raises:
+            UserError: if `random` is anything else.
         """
+        _check_random(random)
         super().__init__(random=random)
         self.parameters = parameters
         self._scene = scene
@@ -158,8 +189,12 @@ class FollowWalls(base.Task):
         return OrderedDict(proximity=spec)
 
     def before_step(self, action: np.ndarray, physics: mujoco.Physics) -> None:
-        """Send the wheel speeds."""
-        self._action = np.array(action, float)
+        """Send the wheel speeds.
+
+        Raises:
+            UserError: if the action is not two numbers.
+        """
+        self._action = _two_numbers(action)
         self._command = command(self._action, self.parameters.speeds)
         physics.data.ctrl[self._scene.wheels] = self._command
         self._k += 1

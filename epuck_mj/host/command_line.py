@@ -20,6 +20,7 @@ from epuck_mj.host.hardship import (
     standard_streams,
 )
 from epuck_mj.host.interruption import follows
+from epuck_mj.host.limits import check_flag
 from epuck_mj.host.output import OUTPUT_LOST, OutputLost
 
 Options = TypeVar("Options")
@@ -107,6 +108,9 @@ EXTRAS = (
     (r" ?\[type=value_error, input_value=\{.*?, input_type=dict\]", ""),
     (r" ?\[type=\w+, input_value=(.*?), input_type=\w+\]", r", got \1"),
     (r" ?For further information visit \S+", ""),
+    # of one key each
+    (r"(^| )(\w+) Value error, ", r"; \2: "),
+    (r"^; ", ""),
     (
         r"^Error parsing (\S+): invalid literal for int\(\) with base 10: ",
         r"\1: expected a whole number, got ",
@@ -115,9 +119,6 @@ EXTRAS = (
         r"^Error parsing (\S+): could not convert string to float: ",
         r"\1: expected a number, got ",
     ),
-    (r"^(\w+) Input should be greater than or equal to ", r"\1: expected at least "),
-    (r"^(\w+) Input should be less than or equal to ", r"\1: expected at most "),
-    (r"^(\w+) Input should be greater than ", r"\1: expected more than "),
     (r"^(\w+) Input should be ", r"\1: expected "),
 )
 """Texts that tyro and pydantic add for programmers, and their replacements."""
@@ -187,8 +188,4 @@ def check_threads(threads: int) -> None:
     Raises:
         UserError: for such a number.
     """
-    if not 0 <= threads <= THREADS_MAX:
-        raise UserError(f"expected threads from 0 to {THREADS_MAX}, got {threads}")
-
-
-THREADS_MAX = 1024
+    check_flag("threads", threads)

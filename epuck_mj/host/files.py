@@ -1,14 +1,16 @@
 """Files: found, read, and written in full or not at all."""
 
+import codecs
 import errno
 import io
 import os
+import re
 import secrets
+import warnings
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from tokenize import TokenError
 
 import numpy as np
 
@@ -151,53 +153,103 @@ def remove_leftovers(folder: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def read_text(path: Path) -> str:
-    """The text of a file.
+def read_bytes(path: Path, most: int) -> bytes:
+    """The bytes of a file, which is not read if it is larger than `most` bytes.
 
     Raises:
-        UserError: if it is missing, not to be read, or not UTF-8.
+        UserError: if it is missing, not to be read, too large, or no file.
     """
     try:
-        return path.read_text(encoding="utf-8")
+        # whoever opens a pipe waits for its other end
+        if _is_special(path):
+            raise OSError(errno.EINVAL, NO_FILE)
+        with path.open("rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            if size <= most:
+                return file.read()
     except OSError as error:
         raise UserError(f"cannot read '{path}': {error.strerror}") from None
     except ValueError as error:
-        # not UTF-8, or no name for a file
+        # no name for a file
         raise UserError(f"cannot read '{path}': {error}") from None
+    sizes = f"at most {most / 1e6:g} MB, got {size / 1e6:.1f} MB"
+    raise UserError(f"cannot read '{path}': expected {sizes}")
+
+
+def read_text(path: Path, most: int = 16_000_000) -> str:
+    """The text of a file of at most `most` bytes, with newlines as python has them.
+
+    It is UTF-8, or UTF-16 if it begins with that byte order mark. What begins as an
+    XML file may declare another encoding.
+
+    Raises:
+        UserError: if it is missing, not to be read, too large, or of another encoding.
+    """
+    content = read_bytes(path, most)
+    try:
+        with io.TextIOWrapper(io.BytesIO(content), _encoding(content)) as file:
+            text = file.read()
+        # halves of characters, which a few encodings can write
+        text.encode()
+    except (ValueError, LookupError) as error:
+        raise UserError(f"cannot read '{path}': {error}") from None
+    return text
+
+
+def _encoding(content: bytes) -> str:
+    """The encoding of a text, as its first bytes say."""
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    declared = XML_DECLARATION.match(content)
+    # with a byte order mark, or without
+    return declared[1].decode() if declared else "utf-8-sig"
+
+
+XML_DECLARATION = re.compile(
+    rb"""<\?xml\s[^>]*?encoding\s*=\s*["']([\w.:-]+)["']""", re.ASCII
+)
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """The arrays of an .npz file.
 
     Raises:
-        UserError: if it is missing, truncated or something else.
+        UserError: if it is missing, truncated, too large, or something else.
     """
-    try:
-        # in memory: np.load leaves a damaged archive open
-        content = path.read_bytes()
-    except OSError as error:
-        raise UserError(f"cannot read '{path}': {error.strerror}") from None
+    # in memory: np.load leaves a damaged archive open
+    content = read_bytes(path, ARRAYS_MAX)
     # numpy takes anything else for a pickle
     if not content.startswith((b"PK\x03\x04", b"PK\x05\x06")):
         raise UserError(f"cannot read '{path}': expected an .npz archive")
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as file:
-            return dict(file)
-    except DAMAGED as error:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            members = archive.infolist()
+        size = sum(member.file_size for member in members)
+        if size > ARRAYS_MAX or len(members) > MEMBERS_MAX:
+            raise ValueError(
+                f"expected at most {MEMBERS_MAX} arrays of {ARRAYS_MAX / 1e6:g} MB "
+                f"altogether, got {len(members)} of {size / 1e6:.0f} MB"
+            )
+        with (
+            warnings.catch_warnings(action="error"),
+            np.load(io.BytesIO(content), allow_pickle=False) as file,
+        ):
+            arrays = dict(file)
+        for name, array in arrays.items():
+            if array.dtype.kind not in "biufU":
+                raise ValueError(f"expected numbers or texts as {name}")
+    # zipfile, zlib and numpy raise a dozen kinds for damaged archives
+    except Exception as error:
         reason = " ".join(str(error).split())
         raise UserError(f"cannot read '{path}': {reason}") from None
+    return arrays
 
 
-DAMAGED = (
-    TypeError,
-    ValueError,
-    EOFError,
-    OSError,
-    RuntimeError,
-    zipfile.BadZipFile,
-    TokenError,
-)
-"""Exceptions that numpy and zipfile raise for damaged archives."""
+ARRAYS_MAX = 1_000_000_000
+"""Most bytes of the arrays of a file, unpacked."""
+
+MEMBERS_MAX = 1000
+"""Most arrays of a file."""
 
 
 def _temporary(path: Path) -> Path:

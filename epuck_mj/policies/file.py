@@ -10,6 +10,7 @@ import numpy as np
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import is_directory, is_file
+from epuck_mj.host.limits import check, shown
 from epuck_mj.host.yaml_and_json import read_json
 from epuck_mj.policies.topology import Topology, topology_from
 from epuck_mj.step.control import BatchPolicy, TaskParameters
@@ -50,15 +51,14 @@ class Origin:
             if not isinstance(fields.get(key), str):
                 raise ValueError(f"it does not say which {key} it is for")
         clearance = fields.get("start_clearance")
-        known = isinstance(clearance, float) and 0 < clearance <= 1
-        if clearance is not None and not known:
-            raise ValueError(
-                f"expected a start_clearance in (0, 1] m, got {clearance!r}"
-            )
+        if clearance is not None:
+            check("start_clearance", clearance)
         hashes = {key: fields.get(key, {}) for key in ("mjcf_sha256", "own_sha256")}
         for key, value in hashes.items():
             if not isinstance(value, dict):
-                raise ValueError(f"expected an object as {key}, got {value!r}")
+                raise ValueError(f"expected an object as {key}, got {shown(value)}")
+            if not all(isinstance(each, str) for each in value.values()):
+                raise ValueError(f"expected texts in {key}, got {shown(value)}")
         return cls(fields["robot"], fields["arena"], clearance, **hashes)
 
 
@@ -114,14 +114,16 @@ class ControllerFile:
             if not isinstance(fields.get(name), dict):
                 raise ValueError(f"expected an object as {name}")
         network = topology_from(fields["network"])
-        genome = np.array(fields.get("genome", ()), float)
-        if genome.shape != (network.n_genes,):
-            raise ValueError(f"expected {network.n_genes} genes, got {genome.shape}")
-        if not np.isfinite(genome).all():
-            raise ValueError("expected finite genes")
+        genome = fields.get("genome")
+        if not isinstance(genome, list):
+            raise ValueError(f"expected a list as genome, got {shown(genome)}")
+        if len(genome) != network.n_genes:
+            raise ValueError(f"expected {network.n_genes} genes, got {len(genome)}")
+        for gene in genome:
+            check("gene", gene)
         task = TaskParameters.from_dict(fields["task"])
         origin = Origin.from_dict(fields["scene"])
-        return cls(network, genome, task, origin, fields["scores"])
+        return cls(network, np.array(genome, float), task, origin, fields["scores"])
 
 
 def champion_file(path: Path) -> Path:
@@ -147,5 +149,5 @@ def load_controller(path: str | Path) -> ControllerFile:
     fields = read_json(path)
     try:
         return ControllerFile.from_dict(fields)
-    except (ValueError, TypeError, OverflowError) as error:
+    except (ValueError, TypeError) as error:
         raise UserError(f"'{path}' is not a controller file: {error}") from None

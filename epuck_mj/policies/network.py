@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from epuck_mj.constants import N_PROXIMITY
+from epuck_mj.host.limits import check
 from epuck_mj.step.elementary import half_tanh
 
 N_ACTIONS = 2
@@ -53,10 +54,9 @@ class Network:
         Raises:
             ValueError: if either is invalid.
         """
-        if type(self.hidden) is not int or self.hidden < 1:
-            raise ValueError(f"expected hidden neurons, 1 or more, got {self.hidden!r}")
+        check("hidden", self.hidden)
         if type(self.biases) is not bool:
-            raise ValueError(f"expected biases true or false, got {self.biases!r}")
+            raise ValueError(f"biases: expected true or false, got {self.biases!r}")
 
     def to_dict(self) -> dict[str, Any]:
         """The topology as written in controller files."""

@@ -21,11 +21,10 @@ import numpy as np
 
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
+from epuck_mj.host.limits import check
 from epuck_mj.host.own_parts import failure, own_part
 from epuck_mj.policies.network import N_ACTIONS, Network, genomes_of
 from epuck_mj.step.control import BatchPolicy
-
-GENES_MAX = 1_000_000
 
 
 class Topology(Protocol):
@@ -69,13 +68,11 @@ class OwnNetwork:
             raise UserError(f"network '{self.name}' {failure(error)}") from None
         if not callable(getattr(network, "act", None)):
             raise UserError(f"network '{self.name}': expected a method 'act'")
-        for key, least in (("n_genes", 1), ("n_state", 0)):
-            n = getattr(network, key, None)
-            if type(n) is not int or not least <= n <= GENES_MAX:
-                raise UserError(
-                    f"network '{self.name}': expected {key}, a whole number from "
-                    f"{least} to {GENES_MAX}, got {n!r}"
-                )
+        try:
+            for key in ("n_genes", "n_state"):
+                check(key, getattr(network, key, None))
+        except ValueError as error:
+            raise UserError(f"network '{self.name}': {error}") from None
         return network
 
     @property

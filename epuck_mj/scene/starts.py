@@ -30,7 +30,10 @@ BLOCK = 64
 """Number of candidates drawn at once; changing it changes all starts."""
 
 BLOCKS_MAX = 1000
-"""Number of blocks drawn before giving up."""
+"""Least number of blocks drawn before giving up."""
+
+DRAWS_MAX = 16
+"""Number of candidates drawn for each start before giving up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +147,8 @@ class FreeSpace:
             UserError: if the free space is too small to be hit.
         """
         starts, grid = np.zeros((0, 3)), self.grid
-        for _ in range(BLOCKS_MAX):
+        blocks = max(BLOCKS_MAX, n * DRAWS_MAX // BLOCK)
+        for _ in range(blocks):
             draws = rng.random((BLOCK, 3))
             poses = np.empty_like(draws)
             poses[:, :2] = grid.lower + draws[:, :2] * (grid.upper - grid.lower)
@@ -156,7 +160,7 @@ class FreeSpace:
                 return starts
         raise UserError(
             f"arena '{self._scene.arena}' has almost no room for a start: "
-            f"{len(starts)} of {n} found among {BLOCK * BLOCKS_MAX} candidates"
+            f"{len(starts)} of {n} found among {BLOCK * blocks} candidates"
         )
 
 

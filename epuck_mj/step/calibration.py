@@ -12,13 +12,8 @@ import numpy as np
 from epuck_mj.constants import N_PROXIMITY, N_WHEELS, TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import write_text, writing
+from epuck_mj.host.limits import check, shown
 from epuck_mj.host.yaml_and_json import read_yaml, to_yaml
-
-GAIN_MAX = 100.0
-"""Upper limit of a sensor's gain."""
-
-LENGTH_MAX = 1.0
-"""Upper limit of wheel radii and track [m]: values in millimetres are refused."""
 
 
 @dataclass(frozen=True)
@@ -40,19 +35,12 @@ class Calibration:
         for name, size in (("proximity_gains", N_PROXIMITY), ("wheel_radii", N_WHEELS)):
             numbers = getattr(self, name)
             if not (isinstance(numbers, tuple) and len(numbers) == size):
-                raise ValueError(f"expected {size} {name}, got {numbers!r}")
-        lengths = (*self.wheel_radii, self.track)
-        for numbers, most, unit in (
-            (self.proximity_gains, GAIN_MAX, ""),
-            (lengths, LENGTH_MAX, " m"),
-        ):
-            for number in numbers:
-                real = isinstance(number, int | float) and number is not True
-                if not (real and 0 < number < most):
-                    raise ValueError(
-                        f"expected numbers above 0 and below {most:g}{unit}, "
-                        f"got {number!s:.20}"
-                    )
+                raise ValueError(f"expected {size} {name}, got {shown(numbers)}")
+        for gain in self.proximity_gains:
+            check("gain", gain, "proximity_gains")
+        for radius in self.wheel_radii:
+            check("length", radius, "wheel_radii")
+        check("length", self.track, "track")
 
     @property
     def gains(self) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import word
+from epuck_mj.host.memory import TRACK_BYTES, check_memory
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.disturbances import (
     BOOK,
@@ -48,10 +49,16 @@ class Conditions:
             raise ValueError("expected randomise or calibration, got both")
 
     def draw(self, rng: np.random.Generator, n: int, steps: int) -> Disturbances | None:
-        """Disturbances of `n` trials of `steps` steps; None for ideal robots."""
+        """Disturbances of `n` trials of `steps` steps; None for ideal robots.
+
+        Raises:
+            UserError: if they need more memory than there is.
+        """
         level = NOISE[self.noise]
         if level is None:
             return None
+        noise = f"noise of {n:,} trials of {steps:,} control steps"
+        check_memory(noise, n * steps * TRACK_BYTES)
         if self.calibration is not None:
             return draw_calibrated(self.calibration, rng, n, steps, level)
         return draw_disturbances(

@@ -7,13 +7,11 @@ from typing import Any, Protocol, Self, runtime_checkable
 import numpy as np
 
 from epuck_mj.constants import PROXIMITY_RANGE
+from epuck_mj.host.limits import check, shown
 from epuck_mj.host.own_parts import is_own
 from epuck_mj.step.fitness import FORMULAS, StepFacts, StepFitness, step_fitness
 from epuck_mj.step.motors import Speeds, command
 from epuck_mj.step.sensors import Reading, observe
-
-STEPS_MAX = 10_000_000
-"""Most control steps of a trial."""
 
 START_CLEARANCE = 0.01
 """Default of the least distance to a wall at a start [m]. Chosen."""
@@ -63,6 +61,9 @@ class TaskParameters:
         sensor_range: where an obstacle stops being seen [m].
         speeds: what a full action means.
 
+    Raises:
+        ValueError: a value beyond its limit, or an unknown fitness.
+
     Source: paper, section 4, where it says; our choices otherwise.
     """
 
@@ -72,6 +73,14 @@ class TaskParameters:
     sensor_range: float = PROXIMITY_RANGE
     speeds: Speeds = field(default_factory=Speeds)
 
+    def __post_init__(self) -> None:
+        """Refuse values beyond their limits."""
+        for name in ("steps", "control_step", "sensor_range"):
+            check(name, getattr(self, name))
+        fitness: Any = self.fitness
+        if not (isinstance(fitness, str) and (fitness in FORMULAS or is_own(fitness))):
+            raise ValueError(f"unknown fitness {shown(fitness)}")
+
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
         """Read what `dataclasses.asdict` gave, as stored with a controller.
@@ -80,17 +89,9 @@ class TaskParameters:
             ValueError: if the fields are others.
         """
         try:
-            task = cls(**{**fields, "speeds": Speeds(**fields["speeds"])})
-            numbers = (task.control_step, task.sensor_range, *astuple(task.speeds))
-            if type(task.steps) is not int or not 0 < task.steps <= STEPS_MAX:
-                raise ValueError(f"expected 1 to {STEPS_MAX} steps, got {task.steps!r}")
-            if not all(0 < number < float("inf") for number in numbers):
-                raise ValueError(f"expected numbers above 0, got {numbers}")
-            if task.fitness not in list(FORMULAS) and not is_own(str(task.fitness)):
-                raise ValueError(f"unknown fitness {task.fitness!r}")
+            return cls(**{**fields, "speeds": Speeds(**fields["speeds"])})
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError(f"not the parameters of a task: {error}") from None
-        return task
 
     @property
     def most(self) -> float | None:

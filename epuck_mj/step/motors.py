@@ -14,6 +14,7 @@ from epuck_mj.constants import (
     WHEEL_RADIUS,
     WHEEL_SPEED_MAX,
 )
+from epuck_mj.host.limits import check
 
 STEP_ANGLE = 2 * np.pi / STEPS_PER_REVOLUTION
 """Angle by which a wheel turns in one step of its motor [rad]."""
@@ -26,10 +27,18 @@ class Speeds:
     Attributes:
         forward: speed at v = 1 [m/s].
         turn: yaw rate at |w| = 1 [rad/s].
+
+    Raises:
+        ValueError: a speed that no e-puck has.
     """
 
     forward: float = SPEED_MAX
     turn: float = TURN_RATE_MAX
+
+    def __post_init__(self) -> None:
+        """Refuse values beyond their limits."""
+        check("v_max", self.forward, "forward")
+        check("w_max", self.turn, "turn")
 
 
 def command(action: np.ndarray, speeds: Speeds) -> np.ndarray:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from epuck_mj.constants import N_PROXIMITY
+from epuck_mj.host.memory import TRACK_BYTES, TRAJECTORY_BYTES, check_memory
 from epuck_mj.rungs.disturbed import disturbed
 from epuck_mj.rungs.simulator import Simulator
 from epuck_mj.rungs.table import robots_in
@@ -47,6 +48,7 @@ def record_tracks(
         disturbances: of each trial; None for ideal robots.
     """
     n, steps = len(starts), task.steps
+    check_memory(f"{n:,} trials of {steps:,} control steps", n * steps * TRACK_BYTES)
     rows = {
         "pose": np.full((n, steps + 1, 3), np.nan),
         "command": np.full((n, steps, 2), np.nan),
@@ -73,6 +75,8 @@ def record_trajectories(
         disturbances: of each trial; None for ideal robots.
     """
     n, steps = len(starts), task.steps
+    size = n * steps * TRAJECTORY_BYTES
+    check_memory(f"{n:,} trials of {steps:,} control steps", size)
     rows = {
         "pose": np.zeros((n, steps + 1, 3)),
         "distance": np.zeros((n, steps + 1, N_PROXIMITY)),

@@ -17,6 +17,7 @@ import tyro
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse, word
 from epuck_mj.host.files import is_file
+from epuck_mj.host.limits import check_flag
 from epuck_mj.host.yaml_and_json import read_yaml
 from epuck_mj.policies.file import champion_file, load_controller
 from epuck_mj.policies.wall_follower import WallFollower
@@ -58,6 +59,7 @@ class Options:
 def view(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
     options = parse(Options, "python -m epuck_mj.view", argv, examples=EXAMPLES)
+    check_flag("seed", options.seed)
     policy: Policy = WallFollower()
     task = TaskParameters()
     conditions = options.robots.conditions
@@ -67,13 +69,14 @@ def view(argv: Sequence[str]) -> int:
         policy, task = file.controller, file.task
         conditions = conditions or _evolved_with(champion)
     if options.seconds is not None:
-        ratio = options.seconds / task.control_step
-        if not 0.5 <= ratio < float("inf"):
+        check_flag("seconds", options.seconds)
+        steps = round(options.seconds / task.control_step)
+        if steps < 1:
             raise UserError(
                 f"expected --seconds of at least a control step, "
                 f"{task.control_step:g} s, got {options.seconds:g}"
             )
-        task = replace(task, steps=round(ratio))
+        task = replace(task, steps=steps)
     # physics is for a command that makes sense
     from epuck_mj.rungs.watched_robot import WatchedRobot
     from epuck_mj.scene.model import load_scene
@@ -121,8 +124,6 @@ def _starts(scene: "Scene", options: Options) -> Iterator[np.ndarray]:
     Raises:
         UserError: if the arena has no room, or the pose is not one.
     """
-    if options.seed < 0:
-        raise UserError(f"expected --seed of 0 or more, got {options.seed}")
     if options.pose is not None:
         pose = np.array(options.pose)
         if not np.isfinite(pose).all():

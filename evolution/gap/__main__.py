@@ -7,15 +7,11 @@ from typing import Annotated
 
 import tyro
 
-from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import check_threads, main, parse, word
 from epuck_mj.host.files import check_writable, writing
+from epuck_mj.host.limits import check_flag
 from epuck_mj.scene.model_files import PLANAR_ROBOT, WHEELED_ROBOT
 from evolution.named_policies import policies_of
-
-NUMBER_MAX = 1000
-"""Most worlds, and most starts in each."""
-
 
 EXAMPLES = (
     "python -m evolution.gap results/paper --output gap",
@@ -47,9 +43,8 @@ class GapOptions:
 def measure_gap(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
     options = parse(GapOptions, "python -m evolution.gap", argv, examples=EXAMPLES)
-    for name, value in (("worlds", options.worlds), ("starts", options.starts)):
-        if not 2 <= value <= NUMBER_MAX:
-            raise UserError(f"expected 2 to {NUMBER_MAX} {name}, got {value}")
+    check_flag("worlds", options.worlds)
+    check_flag("starts", options.starts, "worlds")
     check_threads(options.threads)
     policies = policies_of(dict.fromkeys(options.paths))
     robots = [options.robot] if options.robot else [PLANAR_ROBOT, WHEELED_ROBOT]

@@ -7,14 +7,19 @@ known scores as plain values.
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, Field, StrictFloat, StrictInt, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from epuck_mj.errors import UserError
 from epuck_mj.policies.file import ControllerFile, load_controller
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.step.fitness import of_most
+from evolution.settings.config_fields import within
+
+Score = Annotated[float, within("score")]
+
+Share = Annotated[float, within("share")]
 
 
 class _Record(BaseModel, frozen=True, allow_inf_nan=False):
@@ -32,7 +37,8 @@ class _Record(BaseModel, frozen=True, allow_inf_nan=False):
         except ValidationError as error:
             first = error.errors()[0]
             where = ".".join(map(str, first["loc"])) or "scores"
-            raise UserError(f"'{path}' is damaged: {where}: {first['msg']}") from None
+            what = first["msg"].removeprefix("Value error, ")
+            raise UserError(f"'{path}' is damaged: {where}: {what}") from None
 
     def to_dict(self) -> dict[str, Any]:
         """The known values, in the order of the attributes."""
@@ -57,15 +63,15 @@ class HeldOut(_Record, frozen=True):
             it, None if none has.
     """
 
-    mean: StrictFloat
-    standard_deviation: StrictFloat = math.nan
-    interval: tuple[StrictFloat, StrictFloat] = (math.nan, math.nan)
-    worst: StrictFloat = math.nan
-    crash_rate: StrictFloat
-    collisions_per_minute: StrictFloat = math.nan
-    starts: StrictInt = Field(ge=2)
-    behaviour: Mapping[str, StrictFloat] = {}
-    metrics: Mapping[str, StrictFloat | None] = {}
+    mean: Score
+    standard_deviation: Score = math.nan
+    interval: tuple[Score, Score] = (math.nan, math.nan)
+    worst: Score = math.nan
+    crash_rate: Share
+    collisions_per_minute: Score = math.nan
+    starts: Annotated[int, within("starts")]
+    behaviour: Mapping[str, Share] = {}
+    metrics: Mapping[str, Score | None] = {}
 
     @property
     def following(self) -> float:
@@ -97,8 +103,8 @@ class Believed(_Record, frozen=True):
         held_out: its mean on the test starts, on ideal robots.
     """
 
-    stored: StrictFloat
-    held_out: StrictFloat
+    stored: Score
+    held_out: Score
 
 
 class Scores(_Record, frozen=True):
@@ -112,8 +118,8 @@ class Scores(_Record, frozen=True):
         held_out_as_evolved: tests with the disturbances it evolved with, by robot.
     """
 
-    stored: StrictFloat
-    validation: StrictFloat = math.nan
+    stored: Score
+    validation: Score = math.nan
     held_out: Mapping[str, HeldOut] = Field(min_length=1)
     most_believed: Believed | None = None
     held_out_as_evolved: Mapping[str, HeldOut] = {}
@@ -174,18 +180,5 @@ def read_champion(path: Path) -> tuple[ControllerFile, Scores]:
 class KnownScores(Scores, frozen=True):
     """Scores of any policy, of which each may be unknown."""
 
-    stored: StrictFloat = math.nan
+    stored: Score = math.nan
     held_out: Mapping[str, HeldOut] = {}
-
-    @classmethod
-    def found_in(cls, fields: Mapping[str, Any]) -> Self:
-        """Scores in a file by any program; invalid ones are left out."""
-        sound = dict(fields)
-        while True:
-            try:
-                return cls.model_validate(sound)
-            except ValidationError as error:
-                key, *inside = map(str, error.errors()[0]["loc"])
-            tests = sound.pop(key)
-            if key == "held_out" and inside:
-                sound[key] = {name: tests[name] for name in tests if name != inside[0]}

@@ -18,6 +18,7 @@ from evolution.judging.evaluation import BatchEngine, DmControlEngine, Engine, e
 from evolution.run.history import Record, history_text
 from evolution.search.table import Optimizer, make_optimizer
 from evolution.settings.config import ExperimentConfig
+from evolution.settings.memory import check_needs
 from evolution.settings.randomness import Purpose, disturbances, random_generator
 
 ENGINES = ("batch", "dm_control")
@@ -55,8 +56,10 @@ class Evolution:
             racing: break off individuals that can only lose; changes no result.
 
         Raises:
-            UserError: if robot or arena cannot be used, or the budget is too small.
+            UserError: if robot or arena cannot be used, the budget is too small, or
+                memory is.
         """
+        check_needs(config)
         self.config = config
         self.scene = load_scene(config.robot, config.arena, config.control_step)
         self.space = FreeSpace(self.scene, config.start_clearance)
@@ -177,6 +180,15 @@ class Evolution:
         """
         prefix = "optimizer."
         rows, genomes = (self._array(state, name) for name in ARRAYS)
+        numbered = np.array_equal(rows[:, 0], np.arange(len(rows)))
+        spent = np.diff(rows[:, 1], prepend=0)
+        if not (
+            numbered and (spent > 0).all() and rows[-1, 1] <= self.config.evaluations
+        ):
+            raise ValueError(
+                "expected 'records' of generations from 0 on, with evaluations that "
+                f"rise to at most {self.config.evaluations}"
+            )
         records = [
             Record(int(k), int(n), best, mean, std, int(steps), crashed, bool(climbed))
             for k, n, best, mean, std, steps, crashed, climbed in rows.tolist()
@@ -195,15 +207,17 @@ class Evolution:
 
     def _array(self, state: Mapping[str, np.ndarray], name: str) -> np.ndarray:
         """A float array of a state, one row per generation told."""
-        generations = int(state.get("optimizer.generation", 0))
-        expected = (generations, ARRAYS[name] or self.config.topology.n_genes)
+        generation = state.get("optimizer.generation", np.array(0))
+        if generation.shape != () or generation.dtype.kind != "i" or generation < 1:
+            raise ValueError("expected 1 or more generations")
+        expected = (int(generation), ARRAYS[name] or self.config.topology.n_genes)
         array = state.get(name)
-        if array is None or array.shape != expected or generations < 1:
+        if array is None or array.shape != expected:
             got = "none" if array is None else f"shape {array.shape}"
             raise ValueError(
                 f"expected an array '{name}' of shape {expected}, got {got}"
             )
-        if not np.isfinite(array).all():
+        if array.dtype != float or not np.isfinite(array).all():
             raise ValueError(f"expected an array '{name}' of finite numbers")
         return array
 

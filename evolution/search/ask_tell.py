@@ -85,7 +85,8 @@ def checked_state(
         like: the state of the optimiser that is to be restored; holds 'name'.
 
     Raises:
-        ValueError: another optimiser's state, a missing array, a wrong shape or type.
+        ValueError: another optimiser's state, a missing array, a wrong shape or type,
+            or NaN.
     """
     if "name" in state and str(state["name"]) != str(like["name"]):
         raise ValueError(
@@ -104,6 +105,9 @@ def checked_state(
                 f"state array {key!r}: expected {expected.dtype} {expected.shape}, "
                 f"got {got.dtype} {got.shape}"
             )
+        # a fitness may be infinite
+        if got.dtype.kind == "f" and np.isnan(got).any():
+            raise ValueError(f"state array {key!r}: expected numbers, got nan")
     return arrays
 
 

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.random import Generator
 
+from epuck_mj.host.limits import check
 from evolution.search.ask_tell import (
     Optimizer,
     checked_state,
@@ -77,13 +78,8 @@ class CmaEsParameters:
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
-        if self.population < MIN_POPULATION:
-            raise ValueError(
-                f"population: expected at least {MIN_POPULATION} for two parents, "
-                f"got {self.population}"
-            )
-        if not 0 < self.sigma < np.inf:
-            raise ValueError(f"sigma: expected a number above 0, got {self.sigma}")
+        check("population", self.population, least=MIN_POPULATION)
+        check("sigma", self.sigma)
 
 
 class CmaEs(Optimizer):

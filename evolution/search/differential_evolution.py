@@ -18,6 +18,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.random import Generator
 
+from epuck_mj.host.limits import check
 from evolution.search.ask_tell import Optimizer, read_only
 from evolution.search.bounds import BOUNDS_RULES, check_bounds_rule
 from evolution.search.search_space import SearchSpace
@@ -116,15 +117,9 @@ class DifferentialEvolutionParameters:
                 f"unknown strategy {self.strategy!r}; "
                 f"available: {', '.join(STRATEGIES)}"
             )
-        if self.population < MIN_POPULATION:
-            raise ValueError(
-                f"population: expected at least {MIN_POPULATION} for distinct parents, "
-                f"got {self.population}"
-            )
-        if not 0 <= self.scale <= 2:
-            raise ValueError(f"scale (F): expected 0 to 2, got {self.scale}")
-        if not 0 <= self.crossover <= 1:
-            raise ValueError(f"crossover (CR): expected 0 to 1, got {self.crossover}")
+        check("population", self.population, least=MIN_POPULATION)
+        check("scale", self.scale)
+        check("crossover", self.crossover)
         check_bounds_rule(self.bounds_rule)
 
 

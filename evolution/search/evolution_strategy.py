@@ -21,6 +21,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.random import Generator
 
+from epuck_mj.host.limits import check
 from evolution.search.ask_tell import Optimizer, read_only
 from evolution.search.bounds import BOUNDS_RULES, check_bounds_rule
 from evolution.search.search_space import SearchSpace, refuse_wide_steps
@@ -72,10 +73,8 @@ class EvolutionStrategyParameters:
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
-        if self.lineages < 1:
-            raise ValueError(f"lineages: expected at least 1, got {self.lineages}")
-        if not 0 < self.sigma < np.inf:
-            raise ValueError(f"sigma: expected a number above 0, got {self.sigma}")
+        check("lineages", self.lineages)
+        check("sigma", self.sigma)
         check_bounds_rule(self.bounds_rule)
 
 

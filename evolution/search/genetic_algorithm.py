@@ -18,11 +18,9 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.random import Generator
 
+from epuck_mj.host.limits import check
 from evolution.search.ask_tell import Optimizer, read_only
 from evolution.search.search_space import SearchSpace
-
-# Levels of more bits are not worth a float64's 53 digits.
-MAX_BITS = 32
 
 
 def decode(
@@ -119,17 +117,10 @@ class GeneticAlgorithmParameters:
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
-        if self.population < 2:
-            raise ValueError(f"population: expected at least 2, got {self.population}")
-        if not 1 <= self.bits <= MAX_BITS:
-            raise ValueError(f"bits: expected 1 to {MAX_BITS}, got {self.bits}")
-        if self.tournament < 1:
-            raise ValueError(f"tournament: expected at least 1, got {self.tournament}")
-        if not 0 <= self.crossover <= 1:
-            raise ValueError(f"crossover: expected 0 to 1, got {self.crossover}")
-        if not 0 <= self.mutation <= 1:
-            raise ValueError(f"mutation: expected 0 to 1, got {self.mutation}")
-        if not 0 <= self.elites < self.population:
+        check("population", self.population, least=2)
+        for name in ("bits", "tournament", "crossover", "mutation", "elites"):
+            check(name, getattr(self, name))
+        if self.elites >= self.population:
             raise ValueError(
                 f"elites: expected 0 to population - 1 = {self.population - 1}, "
                 f"got {self.elites}"

@@ -11,6 +11,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.random import Generator
 
+from epuck_mj.host.limits import check
 from evolution.search.ask_tell import Optimizer, read_only
 from evolution.search.search_space import SearchSpace
 
@@ -45,8 +46,7 @@ class RandomSearchParameters:
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
-        if self.population < 1:
-            raise ValueError(f"population: expected at least 1, got {self.population}")
+        check("population", self.population)
 
 
 class RandomSearch(Optimizer):

@@ -8,8 +8,6 @@ from pydantic import (
     ConfigDict,
     Field,
     StrictBool,
-    StrictFloat,
-    StrictInt,
     ValidationError,
     create_model,
     model_validator,
@@ -18,13 +16,14 @@ from pydantic import (
 from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import word
+from epuck_mj.host.limits import shown
 from epuck_mj.host.own_parts import is_own, located, own_part
 from epuck_mj.host.yaml_and_json import parse_yaml, to_yaml
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.topology import OwnNetwork, Topology
 from epuck_mj.scene.model_files import KINEMATIC_ROBOT, absolute
 from epuck_mj.step.conditions import Conditions, NoiseLevel
-from epuck_mj.step.control import START_CLEARANCE, STEPS_MAX, TaskParameters
+from epuck_mj.step.control import START_CLEARANCE, TaskParameters
 from epuck_mj.step.motors import Speeds
 from evolution.search.table import SearchSpace, own_parameters
 from evolution.settings.config_errors import one_line
@@ -32,11 +31,12 @@ from evolution.settings.config_fields import (
     FEEDFORWARD,
     N_TEST,
     N_VALIDATION,
-    STARTS_MAX,
     CalibrationConfig,
     FitnessName,
     NetworkName,
     OptimizerConfig,
+    strictly_typed,
+    within,
 )
 from evolution.settings.setting import Setting
 
@@ -46,10 +46,11 @@ class ExperimentConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    seed: StrictInt = Field(1, ge=0, description="seed of everything random")
-    evaluations: StrictInt = Field(
+    seed: Annotated[int, within("seed")] = Field(
+        1, description="seed of everything random"
+    )
+    evaluations: Annotated[int, within("evaluations")] = Field(
         30_000,
-        ge=1,
         description="number of individuals to evaluate, rounded down to whole "
         "generations",
     )
@@ -59,10 +60,8 @@ class ExperimentConfig(BaseModel):
         "of times faster), epuck (on wheels in MuJoCo), epuck_planar (slides on a "
         "plane in MuJoCo) or the path of an MJCF file",
     )
-    climb: StrictFloat = Field(
+    climb: Annotated[float, within("climb")] = Field(
         0.9,
-        gt=0,
-        le=1,
         description="share of the evaluations that are spent on epuck_kinematic; the "
         "rest is spent on epuck, where the population is evaluated anew; 1: none is; "
         "without effect on other robots",
@@ -70,26 +69,28 @@ class ExperimentConfig(BaseModel):
     arena: Annotated[str, word("ARENA")] = Field(
         "arena", description="name of a shipped arena or the path of an MJCF file"
     )
-    trials: StrictInt = Field(5, ge=1, description="trials per individual")
-    steps: StrictInt = Field(
-        300, ge=1, le=STEPS_MAX, description="control steps per trial"
+    trials: Annotated[int, within("trials")] = Field(
+        5, description="trials per individual"
     )
-    control_step: StrictFloat = Field(
-        0.1, gt=0, description="duration of a control step [s]"
+    steps: Annotated[int, within("steps")] = Field(
+        300, description="control steps per trial"
+    )
+    control_step: Annotated[float, within("control_step")] = Field(
+        0.1, description="duration of a control step [s]"
     )
     fitness: FitnessName = Field(
         "product",
         description="step fitness: product (as the paper describes it), literal (the "
         "paper's equation 2) or my.py:name (a function of your own)",
     )
-    v_max: StrictFloat = Field(
-        SPEED_MAX, gt=0, description="forward speed at v = 1 [m/s]"
+    v_max: Annotated[float, within("v_max")] = Field(
+        SPEED_MAX, description="forward speed at v = 1 [m/s]"
     )
-    w_max: StrictFloat = Field(
-        TURN_RATE_MAX, gt=0, description="yaw rate at w = 1 [rad/s]"
+    w_max: Annotated[float, within("w_max")] = Field(
+        TURN_RATE_MAX, description="yaw rate at w = 1 [rad/s]"
     )
-    sensor_range: StrictFloat = Field(
-        PROXIMITY_RANGE, gt=0, description="range of the proximity sensors [m]"
+    sensor_range: Annotated[float, within("sensor_range")] = Field(
+        PROXIMITY_RANGE, description="range of the proximity sensors [m]"
     )
     noise: NoiseLevel = Field(
         "none",
@@ -104,49 +105,39 @@ class ExperimentConfig(BaseModel):
         description="file written by python -m epuck_mj.calibrate, or its keys: use "
         "that robot in all trials; needs noise",
     )
-    start_clearance: StrictFloat = Field(
-        START_CLEARANCE,
-        gt=0,
-        le=1,
-        description="least distance to a wall at a start [m]",
+    start_clearance: Annotated[float, within("start_clearance")] = Field(
+        START_CLEARANCE, description="least distance to a wall at a start [m]"
     )
     network: NetworkName = Field(
         FEEDFORWARD,
         description="feedforward (the paper's, with the hidden neurons and biases "
         "below) or my.py:Class (a network of your own)",
     )
-    hidden: StrictInt = Field(4, ge=1, description="number of hidden neurons")
+    hidden: Annotated[int, within("hidden")] = Field(
+        4, description="number of hidden neurons"
+    )
     biases: StrictBool = Field(
         False, description="give hidden and output neurons a bias"
     )
-    weight_bound: StrictFloat = Field(
-        5.0, gt=0, le=1e6, description="weights stay within plus or minus this value"
+    weight_bound: Annotated[float, within("weight_bound")] = Field(
+        5.0, description="weights stay within plus or minus this value"
     )
-    weight_init: StrictFloat = Field(
-        5.0,
-        gt=0,
-        le=1e6,
-        description="initial weights are uniform within plus or minus this value",
+    weight_init: Annotated[float, within("weight_init")] = Field(
+        5.0, description="initial weights are uniform within plus or minus this value"
     )
-    validation_starts: StrictInt = Field(
+    validation_starts: Annotated[int, within("validation_starts")] = Field(
         N_VALIDATION,
-        ge=1,
-        le=STARTS_MAX,
         description="number of starts on which the champion is chosen; evolution does "
         "not use them",
     )
-    finalists: StrictInt = Field(
+    finalists: Annotated[int, within("finalists")] = Field(
         5,
-        ge=0,
-        le=1000,
         description="number of the best on epuck_kinematic among which the champion "
         "is chosen on epuck; 0: it is the best on epuck_kinematic; without effect on "
         "other robots",
     )
-    test_starts: StrictInt = Field(
+    test_starts: Annotated[int, within("test_starts")] = Field(
         N_TEST,
-        ge=2,
-        le=STARTS_MAX,
         description="number of other starts on which the champion is tested; evolution "
         "does not use them",
     )
@@ -251,6 +242,10 @@ class ExperimentConfig(BaseModel):
         Raises:
             UserError: beginning with `where`, if a key or a value is invalid.
         """
+        if not isinstance(fields, dict):
+            raise UserError(
+                f"{where}: expected a mapping of keys to values, got {shown(fields)}"
+            )
         kind, fields = _kind_for(fields)
         try:
             return kind.model_validate(fields)
@@ -260,13 +255,13 @@ class ExperimentConfig(BaseModel):
             raise UserError(f"{where}: {problem}") from None
 
 
-def _kind_for(fields: Any) -> tuple[type[ExperimentConfig], Any]:
+def _kind_for(fields: dict) -> tuple[type[ExperimentConfig], dict]:
     """The config class for these fields, and the fields with the optimiser's full path.
 
     Raises:
         UserError: if they name a user's optimiser that cannot be loaded.
     """
-    optimizer: Any = fields.get("optimizer") if isinstance(fields, dict) else None
+    optimizer: Any = fields.get("optimizer")
     algorithm = optimizer.get("algorithm") if isinstance(optimizer, dict) else None
     if not (isinstance(algorithm, str) and is_own(algorithm)):
         return ExperimentConfig, fields
@@ -283,6 +278,7 @@ def config_of_own_optimizer(algorithm: str) -> type[ExperimentConfig]:
         UserError: if the optimiser cannot be loaded.
     """
     kind = own_parameters(algorithm)
+    strict: Any = Annotated[kind, strictly_typed(kind)]
     return create_model(
-        ExperimentConfig.__name__, __base__=ExperimentConfig, optimizer=(kind, ...)
+        ExperimentConfig.__name__, __base__=ExperimentConfig, optimizer=(strict, ...)
     )

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import fields
-from typing import Any
 
 from pydantic import ValidationError
 
+from epuck_mj.host.limits import shown
 from evolution.search.table import ALGORITHMS
 
 
@@ -31,7 +31,10 @@ def one_line(error: ValidationError, keys: Sequence[str], optimizer: type) -> st
             parts.append(detail["msg"].removeprefix("Value error, "))
         else:
             message = detail["msg"].removeprefix("Value error, ")
-            parts.append(f"{key}: {message}, got {_shown(detail['input'])}")
+            # checks of a part as a whole may say themselves what came
+            said = detail["type"] == "value_error" and ", got " in message
+            got = "" if said else f", got {shown(detail['input'])}"
+            parts.append(f"{key}: {message}{got}")
     return "; ".join(parts)
 
 
@@ -42,8 +45,3 @@ def _keys(
     if len(loc) == 1:
         return keys
     return [field.name for field in fields(ALGORITHMS.get(str(loc[1]), optimizer))]
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) < 60 else f"{text[:57]}..."

@@ -1,13 +1,15 @@
 """Types of the keys of a configuration that are more than numbers."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_type_hints
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
 from tyro.constructors import PrimitiveConstructorSpec
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import word
+from epuck_mj.host.limits import LIMITS
 from epuck_mj.host.own_parts import is_own
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.fitness import FORMULAS
@@ -19,11 +21,20 @@ N_VALIDATION = 200
 N_TEST = 1000
 """Default number of starts on which a champion is tested."""
 
-STARTS_MAX = 100_000
-"""Most starts on which a champion is chosen, and on which it is tested."""
-
 FEEDFORWARD = "feedforward"
 """Name of the paper's network, with the configuration's hidden neurons and biases."""
+
+
+def within(name: str) -> BeforeValidator:
+    """Validator of numbers within the limit of that name."""
+    limit = LIMITS[name]
+
+    def check(value: Any) -> Any:
+        if limit.allows(value):
+            return value
+        raise ValueError(limit.expected)
+
+    return BeforeValidator(check)
 
 
 def _one_of(*shipped: str) -> AfterValidator:
@@ -58,7 +69,45 @@ def _of_known_algorithm(value: Any) -> Any:
             f"expected a mapping with 'algorithm', one of {', '.join(ALGORITHMS)}, or "
             "my.py:Class"
         )
+    return _checked_types(ALGORITHMS[algorithm], value)
+
+
+KINDS = {int: "a whole number", float: "a number", bool: "true or false"}
+"""Types whose values pydantic would make of texts and of one another."""
+
+
+def _checked_types(kind: type, value: Any) -> Any:
+    """Parameters of that kind, if numbers are numbers and booleans are booleans.
+
+    Raises:
+        ValidationError: naming those that are not.
+    """
+    # anything but a mapping is refused for that
+    given = value if isinstance(value, dict) else {}
+    errors = [
+        InitErrorDetails(
+            type=PydanticCustomError("kind", "expected {kind}", {"kind": KINDS[hint]}),
+            loc=(key,),
+            input=given[key],
+        )
+        for key, hint in get_type_hints(kind).items()
+        if hint in KINDS and key in given and not _is(given[key], hint)
+    ]
+    if errors:
+        raise ValidationError.from_exception_data(kind.__name__, errors)
     return value
+
+
+def _is(value: Any, kind: type) -> bool:
+    """Whether a value may stand for that kind; 10.0 is a whole number as well."""
+    if kind is bool or isinstance(value, bool):
+        return type(value) is kind
+    return isinstance(value, int | float)
+
+
+def strictly_typed(kind: type) -> BeforeValidator:
+    """Validator of the parameters of a user's optimiser by their types."""
+    return BeforeValidator(lambda value: _checked_types(kind, value))
 
 
 OptimizerConfig = Annotated[

@@ -18,18 +18,19 @@ from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse, shell_command, word
 from epuck_mj.host.interruption import Interrupted, Interruption
+from epuck_mj.host.limits import check_flag
 from epuck_mj.host.yaml_and_json import read_json
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
 from evolution.judging.scores import KnownScores, read_champion
 from evolution.run.directory import RunDirectory
 from evolution.run.lock import locked
 from evolution.run.means import Means
+from evolution.settings.memory import check_needs
 from evolution.study.config import StudyConfig, find_study, parse_seeds
 from evolution.study.directory import PATIENCE, StudyDirectory
 from evolution.study.jobs import Event, Job, carry_out_side_by_side
 
 MODULE = "evolution.study"
-JOBS_MAX = 1024
 
 
 EXAMPLES = (
@@ -79,8 +80,7 @@ def study(argv: Sequence[str]) -> int:
         UserError: for anything the user can put right.
     """
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
-    if not 0 <= options.jobs <= JOBS_MAX:
-        raise UserError(f"expected jobs from 0 to {JOBS_MAX}, got {options.jobs}")
+    check_flag("jobs", options.jobs)
     if options.split and options.cluster is None:
         raise UserError("expected --cluster with --split, got --split alone")
     if options.jobs and options.cluster is not None:
@@ -95,6 +95,9 @@ def study(argv: Sequence[str]) -> int:
     if options.experiments is not None:
         names = [name.strip() for name in options.experiments.split(",")]
         config = config.only(names)
+    if options.cluster is None:
+        for each in config.experiments.values():
+            check_needs(each)
     directory = StudyDirectory(options.output)
     directory.open(config, seeds)
     typed = tuple(argv)

@@ -9,6 +9,7 @@ from typing import Self
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import find
+from epuck_mj.host.limits import shown
 from epuck_mj.host.yaml_and_json import read_yaml, to_yaml
 from evolution.settings.comparison import check_comparable, differing_keys
 from evolution.settings.config import ExperimentConfig
@@ -58,15 +59,28 @@ class StudyConfig:
             raise UserError(
                 f"'{path}': unknown key '{unknown[0]}'; available: {', '.join(KEYS)}"
             )
-        names, common = content.get("experiments"), content.get("common") or {}
-        if not isinstance(names, list) or not names:
+        names, common = content.get("experiments"), content.get("common")
+        if not (
+            isinstance(names, list)
+            and names
+            and all(isinstance(name, str) for name in names)
+        ):
             raise UserError(
-                f"'{path}': expected 'experiments', a list of experiments, got {names}"
+                f"'{path}': expected 'experiments', a list of experiments, got "
+                + shown(names)
             )
+        # nothing behind the colon
+        common = {} if common is None else common
         if not isinstance(common, dict):
-            raise UserError(f"'{path}': expected 'common', a mapping, got {common}")
+            raise UserError(
+                f"'{path}': expected 'common', a mapping, got {shown(common)}"
+            )
+        if "seed" in common:
+            raise UserError(
+                f"'{path}', common: 'seed' has no effect here: expected --seeds"
+            )
         experiments: dict[str, ExperimentConfig] = {}
-        for name in map(str, names):
+        for name in names:
             file = find_config(name)
             if file.stem in experiments:
                 raise UserError(f"'{path}': two experiments are called '{file.stem}'")

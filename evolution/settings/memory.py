@@ -1,0 +1,55 @@
+"""Memory that an experiment needs: products of its keys that are too large together."""
+
+import math
+from collections.abc import Iterator
+
+from epuck_mj.host.memory import TRACK_BYTES, check_memory
+from evolution.search.cma_es import CmaEsParameters
+from evolution.search.differential_evolution import DifferentialEvolutionParameters
+from evolution.search.genetic_algorithm import GeneticAlgorithmParameters
+from evolution.settings.config import ExperimentConfig
+
+COPIES = 8 * 8
+"""Bytes of a float of an array of which several copies are made on the way."""
+
+
+def check_needs(config: ExperimentConfig) -> None:
+    """Refuse an experiment that needs more memory than this computer has.
+
+    Raises:
+        UserError: naming the keys.
+    """
+    sizes = [
+        (math.prod(factors.values()) * size, factors) for factors, size in needs(config)
+    ]
+    size, factors = max(sizes, key=lambda each: each[0])
+    keys = " x ".join(f"{key} ({value:,})" for key, value in factors.items())
+    check_memory(keys, size)
+
+
+def needs(config: ExperimentConfig) -> Iterator[tuple[dict[str, int], int]]:
+    """The largest arrays: numbers multiplied there, and bytes of each entry."""
+    optimizer = config.optimizer
+    # a user's optimiser may have neither
+    key = "lineages" if hasattr(optimizer, "lineages") else "population"
+    individuals = getattr(optimizer, key, 1)
+    if not isinstance(individuals, int) or individuals < 1:
+        individuals = 1
+    population, trials = {key: individuals}, {"trials": config.trials}
+    weights = {"weights of the network": config.topology.n_genes}
+    steps = {"steps": config.steps}
+    yield population | trials | weights, COPIES
+    yield trials | steps, TRACK_BYTES
+    # a tenth of the population
+    yield {"validation_starts": config.validation_starts} | population | weights, 8
+    yield {"test_starts": config.test_starts} | steps, TRACK_BYTES
+    generations = {f"evaluations / {key}": config.evaluations // individuals}
+    yield generations | weights, COPIES
+    if isinstance(optimizer, DifferentialEvolutionParameters):
+        # keys of the shuffle that chooses parents
+        yield population | {"itself": individuals}, COPIES
+    if isinstance(optimizer, GeneticAlgorithmParameters):
+        yield population | {"bits": optimizer.bits} | weights, COPIES
+        yield population | {"tournament": optimizer.tournament}, COPIES
+    if isinstance(optimizer, CmaEsParameters):
+        yield weights | {"itself": config.topology.n_genes}, COPIES
