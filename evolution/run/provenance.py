@@ -18,7 +18,17 @@ from epuck_mj.host.yaml_and_json import read_json
 if TYPE_CHECKING:
     from epuck_mj.scene.model import Scene
 
-PACKAGES = ("mujoco", "dm-control", "numpy", "scipy", "pydantic", "rerun-sdk")
+PACKAGES = (
+    "mujoco",
+    "dm-control",
+    "numpy",
+    "numba",
+    "llvmlite",
+    "scipy",
+    "cmaes",
+    "pydantic",
+    "rerun-sdk",
+)
 
 
 def provenance(
