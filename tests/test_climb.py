@@ -34,6 +34,7 @@ OPTIMIZERS = {
 
 def config(name: str = "de", **more) -> ExperimentConfig:
     fields = {
+        "robot": "epuck_kinematic",
         "evaluations": 80,
         "steps": 15,
         "trials": 2,

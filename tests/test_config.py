@@ -81,6 +81,7 @@ COMMON = {
     "seed": 1,
     "evaluations": 30_000,
     "robot": "epuck_planar",
+    "climb": 0.9,
     "arena": "arena",
     "trials": 5,
     "steps": 300,
@@ -99,6 +100,7 @@ COMMON = {
     "weight_bound": 5.0,
     "weight_init": 5.0,
     "validation_starts": 200,
+    "finalists": 5,
     "test_starts": 1000,
 }
 

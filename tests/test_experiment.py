@@ -232,17 +232,18 @@ def test_differential_evolution_never_loses_its_best(name):
 def test_history_reads_back_exactly():
     experiment = whole("de-best")
     header, *rows = experiment.history().splitlines()
-    assert header == "generation,evaluations,best,mean,std"
+    assert header == "generation,evaluations,best,mean,std,robot"
     assert experiment.history().endswith("\n")
     for row, record in zip(rows, experiment.records, strict=True):
-        generation, evaluations, *rest = row.split(",")
+        generation, evaluations, *rest, robot = row.split(",")
         assert (int(generation), int(evaluations)) == astuple(record)[:2]
         assert tuple(map(float, rest)) == astuple(record)[2:5]
+        assert robot == "epuck_planar"
 
 
 def test_no_history_yet():
     experiment = Evolution(tiny("ga"))
-    assert experiment.history() == ",".join(HISTORY) + "\n"
+    assert experiment.history() == ",".join(HISTORY) + ",robot\n"
     assert (experiment.evaluations, experiment.finished) == (0, False)
 
 

@@ -257,7 +257,7 @@ def edited(tmp_path, old: str, new: str, source: str = "epuck.xml"):
 
 
 def test_unknown_names_are_refused():
-    assert "one of epuck, epuck_planar" in refusal(robot="e-puck")
+    assert "one of epuck_kinematic, epuck, epuck_planar" in refusal(robot="e-puck")
     assert "one of arena" in refusal(arena="no/such.xml")
 
 

@@ -21,7 +21,6 @@ from evolution.reproduce.publish import PAGES, pages_with_tables, shipped
 from evolution.run.directory import RunDirectory
 from evolution.study.config import StudyConfig, find_study
 from evolution.study.data import load_study
-from evolution.verify.__main__ import changes
 
 ROOT = MODELS.parent
 RESULTS = ROOT / "results"
@@ -77,7 +76,7 @@ def test_the_main_experiment_finds_wall_followers():
 
 
 def test_a_shipped_champion_scores_the_same_on_this_machine():
-    """To the last bit where version and processor are those of the run.
+    """As far as the networks' arithmetic, which has changed since, lets it.
 
     On the plane, and one that crashes soon, which is quicker; `evolution.verify` does
     the same on wheels, too, in half a minute.
@@ -87,7 +86,9 @@ def test_a_shipped_champion_scores_the_same_on_this_machine():
     written = Scores.read(champion.scores, run.champion).held_out["epuck_planar"]
     judge = Judges().of("epuck_planar", config.setting)
     test = judge.test(champion.controller, written.starts)
-    assert test == written or changes(run.provenance_fields())
+    assert test.starts == written.starts
+    assert test.mean == pytest.approx(written.mean, abs=1)
+    assert test.crash_rate == pytest.approx(written.crash_rate, abs=0.02)
 
 
 def test_the_pages_show_what_is_shipped():

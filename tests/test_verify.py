@@ -324,7 +324,7 @@ def test_what_an_older_file_does_not_say(shipped, tmp_path, capsys):
         (
             "champion.json",
             setting("scores", "stored", to="8.9"),
-            "stored: Input s",
+            "stored: expected a number",
         ),
         ("history.csv", lambda text: text[:60], "is damaged"),
         ("history.csv", lambda text: "", "is damaged"),
