@@ -12,10 +12,12 @@ from epuck_mj.errors import UserError
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.rungs.watched_robot import WatchedRobot
+from epuck_mj.scene.geometry import walls
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.scene.robot_parts import SHELL
 from epuck_mj.scene.sameness import check_same
+from epuck_mj.scene.starts import survey
 from epuck_mj.step.control import TaskParameters, drive
 from evolution.judging.evaluation import DmControlEngine, Work
 
@@ -73,6 +75,9 @@ GLOBALS = {
     "a class": '<default><default class="epuck/wheel"/></default>',
     "memory": '<size memory="2K"/>',
     "keys": '<keyframe><key qpos="1 2 3"/></keyframe>',
+    "margins": '<default><geom margin="0.02" gap="0.01"/></default>',
+    "ice first": '<default><geom priority="3" friction="0"/></default>',
+    "user data": '<size nuser_actuator="5" nuser_geom="2" nuser_sensor="3"/>',
 }
 
 
@@ -87,6 +92,29 @@ def test_nothing_global_reaches_the_robot(tmp_path, robot):
         arena.write_text(with_head(element))
         # some move no bit of the model but what is drawn
         np.testing.assert_array_equal(driven(robot, arena), expected, name)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("height", [-0.02, 0.012, 0.02])
+def test_robots_stand_on_the_floor_that_is_there(tmp_path, robot, height):
+    arena = tmp_path / "arena.xml"
+    arena.write_text(PLAIN)
+    expected = driven(robot, arena)
+    floor = '<geom name="floor" type="plane" size="1 1 0.1"/>'
+    board = f'<geom type="box" size=".5 .5 .01" pos="0 0 {height - 0.01}"/>'
+    for ground in (floor.replace("/>", f' pos="0 0 {height}"/>'), board):
+        arena.write_text(PLAIN.replace(floor, ground))
+        scene = load_scene(robot, str(arena))
+        assert scene.height == pytest.approx(height)
+        # wheels roll on a box as on a plane, but not to the last bit
+        np.testing.assert_allclose(driven(robot, arena)[:15], expected[:15], atol=0.003)
+
+
+def test_a_low_wall_is_no_floor(tmp_path):
+    path = tmp_path / "arena.xml"
+    path.write_text(re.sub("0.03", "0.015", re.sub(".*floor.*", "", PLAIN)))
+    assert load_scene("epuck_planar", str(path)).height == 0
+    assert "has no floor" in refusal(path)
 
 
 def test_many_at_once_change_nothing_either(tmp_path):
@@ -122,22 +150,6 @@ def refusal(path: Path, robot: str = "epuck") -> str:
 
 
 REFUSED = {
-    "margin of a wall": (
-        PLAIN.replace('name="e"', 'name="e" margin="0.01"'),
-        "geom 'e': margin",
-    ),
-    "gap of the floor": (
-        PLAIN.replace('name="floor"', 'name="floor" gap="0.01"'),
-        "geom 'floor': margin and gap",
-    ),
-    "margin by default": (
-        with_head('<default><geom margin="0.002"/></default>'),
-        "margin and gap have to be 0",
-    ),
-    "icy floor": (
-        PLAIN.replace('name="floor"', 'name="floor" priority="3" friction="0"'),
-        "geom 'floor': priority has to be below 1",
-    ),
     "cellar": (
         PLAIN.replace('name="floor"', 'name="floor" pos="0 0 -0.1"'),
         "geom 'floor': a floor at height -100 mm",
@@ -172,6 +184,25 @@ def test_things_that_move_keep_their_floor(tmp_path):
     mujoco.mj_step(scene.model, data, 200)
     assert data.xpos[1:, 2] == pytest.approx([0.02, 0, 0.0205, 0.0205], abs=0.002)
     assert not scene.reading(data.sensordata).contact
+    # and robots have theirs: it is no wall that a shell could be too near to
+    other = tmp_path / "plain.xml"
+    other.write_text(PLAIN)
+    assert not walls(scene.model)[scene.model.geom("floor").id]
+    free = [survey(load_scene("epuck", str(p)), 0.01).inside for p in (path, other)]
+    assert 0.9 * free[1].sum() < free[0].sum() < free[1].sum()
+
+
+def test_a_maze_with_a_body_for_every_wall_has_room_in_memory(tmp_path):
+    bricks = "".join(
+        f'<body pos="{-0.39 + 0.02 * i} {-0.39 + 0.04 * j} .03">'
+        '<geom type="box" size=".005 .005 .03"/></body>'
+        for i in range(20)
+        for j in range(20)
+    )
+    path = tmp_path / "arena.xml"
+    path.write_text(PLAIN.replace("</worldbody>", f"{bricks}</worldbody>"))
+    assert survey(load_scene("epuck", str(path)), 0.01).inside.any()
+    assert np.isfinite(driven("epuck", path)).all()
 
 
 def unstable(scene) -> None:

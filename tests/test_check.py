@@ -148,20 +148,20 @@ ERRORS = {
         "has no floor for the robot's wheels",
     ),
     "floor too low": (
-        ARENA.replace('<geom name="floor"', '<geom name="floor" pos="0 0 -0.02"'),
-        'my.xml:7: error: <geom name="floor">: a floor at height -20 mm; expected 0',
+        ARENA.replace('<geom name="floor"', '<geom name="floor" pos="0 0 -0.1"'),
+        'my.xml:7: error: <geom name="floor">: a floor at height -100 mm; expected 0',
+    ),
+    "floor too high": (
+        with_more('<geom name="attic" type="plane" size="1 1 1" pos="0 0 0.2"/>'),
+        f'my.xml:{MORE}: error: <geom name="attic">: a floor at height 200 mm',
+    ),
+    "mat on a floor": (
+        with_more('<geom name="mat" type="box" size=".3 .3 .004" pos="0 0 .004"/>'),
+        f'my.xml:{MORE}: error: <geom name="mat">: no room for a start: it is in the ',
     ),
     "slab below the shell": (
         with_more('<geom name="slab" type="box" pos="0 0 0" size=".1 .1 .001"/>'),
         f'my.xml:{MORE}: error: <geom name="slab">: it lies below the shell',
-    ),
-    "margin": (
-        east(EAST_GEOM.replace("/>", ' margin="0.01"/>')),
-        f'my.xml:{EAST}: error: <geom name="east">: margin and gap have to be 0',
-    ),
-    "priority": (
-        ARENA.replace('size="1 1 1"', 'size="1 1 1" priority="2"'),
-        'my.xml:7: error: <geom name="floor">: priority has to be below 1',
     ),
     "ramp": (
         with_more(
@@ -202,7 +202,7 @@ ERRORS = {
     ),
     "no walls": (
         re.sub(r".*type=\"box\".*\n", "", ARENA),
-        "my.xml: error: arena '",
+        "my.xml: error: the arena has no walls: expected geoms fixed to the world",
     ),
     "nowhere": (
         with_more('<geom type="box" pos="1e30 0 0" size="1 1 1"/>'),
@@ -229,7 +229,7 @@ ERRORS = {
     ),
     "file": (
         ARENA.replace("<asset>", '<asset><mesh name="m" file="no.stl"/>'),
-        'my.xml:3: error: <mesh name="m">: MuJoCo: ',
+        "my.xml:3: error: <mesh name=\"m\">: no file 'no.stl'",
     ),
     "include that is not there": (
         ARENA.replace("<asset>", '<include file="walls.xml"/><asset>'),
@@ -277,7 +277,14 @@ WARNINGS = {
     ),
     "ball": (
         with_more('<body pos="0 0 .05"><freejoint/><geom size=".05"/></body>'),
-        f"my.xml:{MORE}: warning: <geom>: it moves, so it is no wall: touching it",
+        f"my.xml:{MORE}: warning: <body>: it moves, so it is no wall: touching it",
+    ),
+    "robot of many parts": (
+        with_more(
+            '<body name="r" pos="0 0 .02"><freejoint/><geom size=".01"/><body>'
+            '<joint/><geom size=".01" pos=".02 0 0"/></body></body>'
+        ),
+        f'my.xml:{MORE}: warning: <body name="r">: it moves, so it is no wall: ',
     ),
     "leaning wall": (
         east(
@@ -358,6 +365,19 @@ GOOD = {
         'type="plane" size="1 1 1" contype="2" conaffinity="2"',
         'type="box" size="1 1 .01" pos="0 0 -.01"',
     ),
+    "board": ARENA.replace(
+        'type="plane" size="1 1 1" contype="2" conaffinity="2"',
+        'type="box" size=".33 .33 .006" pos="0 0 .006"',
+    ),
+    "plane somewhat lower": ARENA.replace(
+        '<geom name="floor"', '<geom name="floor" pos="0 0 -0.002"'
+    ),
+    "margin": east(EAST_GEOM.replace("/>", ' margin="0.01" gap="0.01"/>')),
+    "priority": ARENA.replace('size="1 1 1"', 'size="1 1 1" priority="2"'),
+    "planes for show above, and one to fall on far below": with_more(
+        '<geom type="plane" size=".1 .1 1" pos="0 0 .5" contype="0" conaffinity="0"/>'
+        '<geom type="plane" size="9 9 1" pos="0 0 -.5"/>'
+    ),
     "space in the last tag": ARENA.replace("</mujoco>", "</mujoco >"),
     "comment behind the root": ARENA + "<!-- </mujoco> -->",
     "names of the robot's": with_more(
@@ -375,6 +395,63 @@ GOOD = {
 def test_no_false_alarm(check, name):
     status, lines = check(GOOD[name])
     assert (status, wrong(lines)) == (0, [])
+
+
+def test_the_same_of_many_is_said_once(check):
+    post = '<geom name="p{}" type="cylinder" size=".01 .03" pos="{} {} .03"/>'
+    places = [(x, y) for x in (-0.15, 0, 0.15) for y in (-0.15, 0, 0.15)]
+    posts = "\n".join(post.format(i, x, y) for i, (x, y) in enumerate(places))
+    status, lines = check(with_more(posts))
+    found = wrong(lines)
+    assert (status, lines[-1]) == (0, "my.xml: usable; 0 errors, 9 warnings")
+    assert len(found) == report.ALIKE_MAX + 1
+    assert all("too thin for single rays" in line for line in found[:-1])
+    assert found[-1].endswith(
+        'the same of 6 more: <geom name="p3">, <geom '
+        'name="p4">, <geom name="p5">, <geom name="p6">, '
+        '<geom name="p7">, <geom name="p8">'
+    )
+
+
+def test_what_is_said_of_physics_and_not_used_is_listed(check):
+    text = ARENA.replace('size="1 1 1"', 'size="1 1 1" margin=".01" priority="2"')
+    text = text.replace('gravity="', "").replace(
+        "<asset>", "<size memory='1M'/><asset>"
+    )
+    _, lines = check(text)
+    said = " ".join(" ".join(lines).split())
+    assert "not used, since the robot brings its own physics: <option> of line 2, " in (
+        said
+    )
+    assert "margin of geoms (line 7), priority of geoms (line 7)" in said
+
+
+def test_the_height_of_a_board_is_said(check):
+    _, lines = check(GOOD["board"])
+    assert '  robots stand at height 12.0 mm: on <geom name="floor">' in lines
+
+
+def test_walls_with_the_bits_of_others_are_named(check):
+    bits = 'contype="0" conaffinity="2"'
+    status, lines = check(ARENA.replace('0.03"/>', f'0.03" {bits}/>'))
+    found = wrong(lines)
+    assert status == 1
+    assert "expected 1 of a wall" in found[0]
+    assert found[0].startswith(f'my.xml:{EAST}: warning: <geom name="east">: rays see')
+    assert "has no walls" in found[-1]
+
+
+def test_lines_of_attached_models_are_those_of_their_files(check, tmp_path):
+    (tmp_path / "part.xml").write_text(
+        '<mujoco>\n<worldbody>\n<body name="p">\n'
+        '<geom name="g" type="cylinder" size=".01 .03" pos="0 0 .03"/>'
+        "</body></worldbody></mujoco>"
+    )
+    text = ARENA.replace("<asset>", '<asset><model name="m" file="part.xml"/>')
+    text = text.replace("<!-- more -->", '<attach model="m" body="p" prefix="a_"/>')
+    _, lines = check(text)
+    (line,) = wrong(lines)
+    assert line.startswith('part.xml:4: warning: <geom name="g">: too thin for single')
 
 
 def test_lines_within_replicates_frames_and_includes(check, tmp_path):

@@ -148,3 +148,29 @@ def test_walls_without_an_exact_distance_are_refused(tmp_path):
     path = arena(tmp_path, '<geom type="hfield" hfield="hills"/>', assets=heights)
     with pytest.raises(UserError, match="a wall that is a hfield"):
         ClearanceProbe(load_scene("epuck_planar", path))
+
+
+def test_of_many_walls_those_near_are_enough(tmp_path, monkeypatch):
+    """Exactly, bit for bit, wherever a robot is and whichever walls are near."""
+    rng = np.random.default_rng(0)
+    kinds = (
+        'box" size=".05 .01 .03',
+        'cylinder" size=".02 .03',
+        'capsule" size=".01 .04',
+    )
+    geoms = "".join(
+        f'<geom type="{kinds[i % 3]}" pos="{x:.3f} {y:.3f} .03" euler="0 0 {40 * i}"/>'
+        for i, (x, y) in enumerate(rng.uniform(-1, 1, (60, 2)))
+    )
+    geoms += '<geom type="plane" size="1 1 1" pos="-1 0 0" zaxis="1 0 0"/>'
+    path = tmp_path / "arena.xml"
+    path.write_text(f"<mujoco><worldbody>{geoms}</worldbody></mujoco>")
+    scene = load_scene("epuck_planar", str(path))
+    poses = np.append(rng.uniform(-1.4, 1.4, (400, 3)), [[9, 9, 0]], axis=0)
+    some = ClearanceProbe(scene, 1).measure(poses)
+    monkeypatch.setattr("epuck_mj.scene.clearance.WALLS_MAX", 100)
+    every = ClearanceProbe(scene, 1).measure(poses)
+    np.testing.assert_array_equal(some.distance, every.distance)
+    np.testing.assert_array_equal(some.direction, every.direction)
+    assert (some.distance == 0.2).any()
+    assert (some.distance < 0).any()

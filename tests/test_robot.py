@@ -534,7 +534,7 @@ def test_any_exception_stops_the_robot(at_wall, error):
 
 def test_nobody_waits_for_a_robot_that_calibrates(at_wall):
     """It stood when it began, and answers nothing before it has finished."""
-    world = at_wall("")
+    world, began = at_wall(""), 0.0
     with pytest.raises(KeyboardInterrupt), world.robot as robot:
         robot.greet()
         world.link.flush()

@@ -145,6 +145,6 @@ def test_scenes_that_are_compiled_alike_are_surveyed_once(tmp_path):
 
 def test_as_many_starts_as_are_allowed_are_found(planar):
     """Not only those that a fixed number of candidates holds."""
-    n = LIMITS["starts"].most
+    n = int(LIMITS["starts"].most)
     starts = FreeSpace(planar, 0.01).sample(np.random.default_rng(0), n)
     assert starts.shape == (n, 3)

@@ -16,16 +16,25 @@ from epuck_mj.check.findings import Finding, Place, Unusable, error, errors, inf
 from epuck_mj.check.heights import heights_of
 from epuck_mj.check.parts import part_findings
 from epuck_mj.check.room import room_findings
-from epuck_mj.check.sight import sight_findings
+from epuck_mj.check.sight import same_view, sight_findings
 from epuck_mj.check.source import (
     TOPIC,
-    geom_places,
+    Places,
+    missing_files,
     place_of,
+    places_of,
     read,
     settings_not_used,
 )
 from epuck_mj.check.speed import speed_findings
-from epuck_mj.check.walls import finite_findings, floor_findings, wall_findings
+from epuck_mj.check.walls import (
+    finite_findings,
+    floor_findings,
+    moving_findings,
+    shape_findings,
+    untouched_findings,
+    wall_findings,
+)
 from epuck_mj.errors import UserError
 from epuck_mj.scene.floor import BadGeom
 from epuck_mj.scene.model import Scene, load_scene
@@ -70,34 +79,51 @@ def check_arena(arena: str, robots: Sequence[str]) -> Report:
         UserError: if the arena cannot be read, or a robot cannot be used at all.
     """
     path = find_arena(arena)
-    checks = []
+    checks, seen = list[Report](), list[Scene]()
     for robot in robots:
         # in an arena that is sound, what is wrong is the robot
         load_scene(robot, "arena")
-        checks.append(_check(path, robot))
+        checks.append(_check(path, robot, seen))
     # what was found with each robot is one finding
     findings = dict.fromkeys(found for check in checks for found in check.findings)
-    first = checks[0]
-    return Report(path, tuple(findings), first.scene, first.grid)
+    drawn = next((check for check in checks if check.grid), checks[0])
+    return Report(path, tuple(findings), drawn.scene, drawn.grid)
 
 
-def _check(arena: Path, robot: str) -> Report:
-    """Findings about an arena with one robot, as far as they can be made."""
+def _check(arena: Path, robot: str, seen: list[Scene]) -> Report:
+    """Findings about an arena with one robot, as far as they can be made.
+
+    Args:
+        arena: path of the MJCF.
+        robot: name or path.
+        seen: scenes of robots whose view was checked; this one is added.
+    """
     findings: list[Finding] = []
     scene = grid = None
     try:
         files = read(arena)
+        findings += missing_files(files)
+        if errors(findings):
+            return Report(arena, tuple(findings), scene, grid)
         scene, places = _scene(files, robot)
         findings += _settings(files)
         findings += finite_findings(scene.model, places)
+        findings += shape_findings(scene.model, places)
         if not errors(findings):
-            grid = _grid(scene)
             heights = heights_of(scene)
             findings += floor_findings(scene, places)
+            findings += moving_findings(scene.model, places)
+            try:
+                grid = survey(scene, START_CLEARANCE)
+            except UserError as problem:
+                findings += untouched_findings(scene.model, places, heights)
+                findings.append(_about(problem, scene.arena))
+                return Report(arena, tuple(findings), scene, None)
             findings += wall_findings(scene, grid, places, heights)
-            if not errors(findings):
+            findings += room_findings(scene, grid, places)
+            if not errors(findings) and not any(same_view(scene, s) for s in seen):
                 findings += sight_findings(scene, grid, places, heights)
-            findings += room_findings(scene, grid)
+                seen.append(scene)
             if not errors(findings):
                 findings += _robot_findings(scene, robot, places)
     except Unusable as problem:
@@ -105,8 +131,8 @@ def _check(arena: Path, robot: str) -> Report:
     return Report(arena, tuple(findings), scene, grid)
 
 
-def _scene(files: SourceFiles, robot: str) -> tuple[Scene, tuple[Place, ...]]:
-    """The scene and the place of each geom, if a usable one can be made of an arena.
+def _scene(files: SourceFiles, robot: str) -> tuple[Scene, Places]:
+    """The scene and the places of its parts, if a usable one can be made of an arena.
 
     Raises:
         Unusable: if not.
@@ -114,56 +140,46 @@ def _scene(files: SourceFiles, robot: str) -> tuple[Scene, tuple[Place, ...]]:
     try:
         scene = load_scene(robot, str(files.main))
     except BadGeom as problem:
-        place = geom_places(files)[problem.geom]
+        place = places_of(files).geom(problem.geom)
         raise Unusable(error(TOPIC, problem.problem, place)) from None
     except BadXml as problem:
         raise Unusable(error(TOPIC, problem.problem, place_of(problem))) from None
     except UserError as problem:
         # it may have a line
-        geom_places(files)
-        raise Unusable(error(TOPIC, str(problem), Place(files.main))) from None
+        places_of(files)
+        raise Unusable(_about(problem, files.main)) from None
     try:
-        known = geom_places(files)
+        return scene, places_of(files)
     except Unusable:
-        known = ()
-    unknown = (Place(files.main),) * scene.model.ngeom
-    return scene, (*known, *unknown)[: scene.model.ngeom]
+        return scene, Places((), (), Place(files.main))
 
 
 def _settings(files: SourceFiles) -> list[Finding]:
     """Information about what the arena says of physics and is not used."""
-    shown = [
-        f"{element.shown} of line {element.line}"
-        for element in settings_not_used(files)
-    ]
+    shown = settings_not_used(files)
     if not shown:
         return []
     text = f"not used, since the robot brings its own physics: {', '.join(shown)}"
     return [info(TOPIC, text)]
 
 
-def _grid(scene: Scene) -> Grid:
-    """Grid of the places where the robot fits.
-
-    Raises:
-        Unusable: if there are no walls.
-    """
-    try:
-        return survey(scene, START_CLEARANCE)
-    except UserError as problem:
-        raise Unusable(error("walls", str(problem), Place(scene.arena))) from None
+def _about(problem: UserError, arena: Path) -> Finding:
+    """An error about an arena as a whole, whose path stands before it anyway."""
+    text = str(problem).replace(f"arena '{arena}' ", "the arena ")
+    text = text.removeprefix(f"arena '{arena}': ")
+    return error(TOPIC, text.replace(f" '{arena}'", " it"), Place(arena))
 
 
-def _robot_findings(
-    scene: Scene, robot: str, places: tuple[Place, ...]
-) -> list[Finding]:
+def _robot_findings(scene: Scene, robot: str, places: Places) -> list[Finding]:
     """Findings about a robot at starts, if the arena has any."""
     topic = f"robot {Path(robot).name}"
     rng = np.random.default_rng(SEED)
     starts = FreeSpace(scene, START_CLEARANCE).sample(rng, N_STARTS)
-    return [
-        *part_findings(scene, starts[0], topic),
-        *rest_findings(scene, starts, topic, places),
-        *drive_findings(scene, starts, topic, Place(scene.arena)),
-        *speed_findings(scene, starts[0], topic),
-    ]
+    findings = part_findings(scene, starts[0], topic)
+    try:
+        findings += rest_findings(scene, starts, topic, places)
+        findings += drive_findings(scene, starts, topic, Place(scene.arena))
+        findings += speed_findings(scene, starts[0], topic)
+    except UserError as problem:
+        findings.append(_about(problem, scene.arena))
+    return findings

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from epuck_mj.check.findings import Finding, Place, error, info, warning
+from epuck_mj.check.source import Places
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.robot_parts import PREFIX, ROBOT_BODY
 
@@ -63,7 +64,7 @@ def settle(scene: Scene, start: np.ndarray) -> Rest:
 
 
 def rest_findings(
-    scene: Scene, starts: np.ndarray, topic: str, places: tuple[Place, ...]
+    scene: Scene, starts: np.ndarray, topic: str, places: Places
 ) -> list[Finding]:
     """Findings about robots left at rest on starts `(n, 3)`."""
     rests = [settle(scene, start) for start in starts]
@@ -91,21 +92,19 @@ def rest_findings(
     if not np.abs(moved).max() <= MOVED_MAX:
         x, y, z = 1000 * moved
         text = f"robots do not stay where they are put: after {seconds} one has moved "
-        text += f"by {x:.1f}, {y:.1f}, {z:.1f} mm along x, y, z; expected a level "
-        findings.append(error(topic, text + "floor at height 0", place))
+        text += f"by {x:.1f}, {y:.1f}, {z:.1f} mm along x, y, z; expected a "
+        findings.append(error(topic, text + "level floor", place))
     if depth > DEPTH_MAX:
         text = f"geoms at rest sink {1000 * depth:.1f} mm into each other; "
         findings.append(warning(topic, text + "expected a stiffer contact", place))
     return findings
 
 
-def _pair(
-    model: mujoco.MjModel, pair: tuple[int, int], places: tuple[Place, ...]
-) -> str:
+def _pair(model: mujoco.MjModel, pair: tuple[int, int], places: Places) -> str:
     """Two geoms, by name or by line."""
     names = [
         model.geom(geom).name.removeprefix(PREFIX)
-        or f"geom of line {places[geom].line}"
+        or f"geom of line {places.geom(geom).line}"
         for geom in pair
     ]
     return " and ".join(names)

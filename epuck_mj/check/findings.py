@@ -1,11 +1,14 @@
 """Findings of a check: a line of text, its severity, and its place in the XML."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
 from epuck_mj.errors import UserError
+
+NAMES_MAX = 6
+"""Most names of one kind that are listed."""
 
 
 class Severity(StrEnum):
@@ -43,12 +46,14 @@ class Finding:
         severity: how bad it is.
         text: one line.
         place: what it is about, if that was written somewhere.
+        where: where in the arena it was met, if that is not all of it.
     """
 
     topic: str
     severity: Severity
     text: str
     place: Place | None = None
+    where: str = ""
 
 
 def info(topic: str, text: str) -> Finding:
@@ -56,14 +61,20 @@ def info(topic: str, text: str) -> Finding:
     return Finding(topic, Severity.INFO, text)
 
 
-def warning(topic: str, text: str, place: Place | None) -> Finding:
+def warning(topic: str, text: str, place: Place | None, where: str = "") -> Finding:
     """A finding about something that is probably wrong."""
-    return Finding(topic, Severity.WARNING, text, place)
+    return Finding(topic, Severity.WARNING, text, place, where)
 
 
-def error(topic: str, text: str, place: Place | None) -> Finding:
+def error(topic: str, text: str, place: Place | None, where: str = "") -> Finding:
     """A finding with which the arena cannot be used."""
-    return Finding(topic, Severity.ERROR, text, place)
+    return Finding(topic, Severity.ERROR, text, place, where)
+
+
+def names(shown: Sequence[str]) -> str:
+    """The first of some names, and how many more there are."""
+    more = f" and {len(shown) - NAMES_MAX} more" if len(shown) > NAMES_MAX else ""
+    return ", ".join(shown[:NAMES_MAX]) + more
 
 
 def errors(findings: Iterable[Finding]) -> list[Finding]:

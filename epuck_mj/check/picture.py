@@ -9,7 +9,7 @@ from matplotlib.patches import Patch
 
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.outline import geom_outlines, shell_outline, wall_outlines
-from epuck_mj.scene.robot_parts import ROBOT_BODY, static
+from epuck_mj.scene.robot_parts import of_robot, static
 from epuck_mj.scene.starts import Grid
 from epuck_mj.show.colors import GREEN, ORANGE, fraction
 
@@ -74,6 +74,4 @@ def region_figure(scene: Scene, grid: Grid, title: str) -> Figure:
 
 def _moving(scene: Scene) -> np.ndarray:
     """Which geoms of the arena move, `(ngeom,)`."""
-    model = scene.model
-    robot = model.body_rootid[model.geom_bodyid] == model.body(ROBOT_BODY).id
-    return ~static(model) & ~robot
+    return ~static(scene.model) & ~of_robot(scene.model)

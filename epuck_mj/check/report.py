@@ -5,9 +5,12 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from epuck_mj.check.findings import Finding, Place, Severity, errors
+from epuck_mj.check.findings import Finding, Place, Severity, errors, names
 
 WIDTH = 88
+
+ALIKE_MAX = 3
+"""Most findings with one text that are printed in full."""
 
 PLURALS = {Severity.ERROR: "errors", Severity.WARNING: "warnings"}
 
@@ -21,7 +24,15 @@ def lines(arena: Path, findings: Sequence[Finding]) -> Iterator[str]:
             if finding.topic == topic:
                 yield from _wrapped(finding.text)
     for severity in (Severity.WARNING, Severity.ERROR):
-        yield from (_wrong(f) for f in findings if f.severity is severity)
+        alike: dict[tuple[str, str], list[Finding]] = {}
+        for finding in findings:
+            if finding.severity is severity:
+                alike.setdefault((finding.topic, finding.text), []).append(finding)
+        for group in alike.values():
+            # a line for one more takes as much room as that one
+            n = ALIKE_MAX if len(group) > ALIKE_MAX + 1 else len(group)
+            yield from (_wrong(finding) for finding in group[:n])
+            yield from _more(group[n:])
     outcome = "usable" if usable(findings) else "not usable"
     counts = ", ".join(_count(findings, severity) for severity in PLURALS)
     yield f"{_shown(arena)}: {outcome}; {counts}"
@@ -50,7 +61,21 @@ def _wrong(finding: Finding) -> str:
         return f"{finding.severity}: {finding.topic}: {finding.text}"
     element = finding.place.element
     about = f"{element}: " if element else ""
-    return f"{_where(finding.place)}: {finding.severity}: {about}{finding.text}"
+    text = f"{about}{finding.text}{finding.where}"
+    return f"{_where(finding.place)}: {finding.severity}: {text}"
+
+
+def _more(alike: list[Finding]) -> Iterator[str]:
+    """One line for more findings with a text that was printed already."""
+    if alike:
+        places = [finding.place for finding in alike if finding.place]
+        shown = [
+            place.element if "name=" in place.element else f"line {place.line}"
+            for place in places
+        ]
+        start = f"{_where(places[0])}: " if places else ""
+        text = f"the same of {len(alike)} more: {names(shown)}"
+        yield f"{start}{alike[0].severity}: {text}"
 
 
 def _where(place: Place) -> str:

@@ -5,12 +5,14 @@ import math
 import numpy as np
 from scipy import ndimage
 
-from epuck_mj.check.findings import Finding, Place, error, info, warning
+from epuck_mj.check.findings import Finding, Place, error, info, names, warning
+from epuck_mj.check.heights import extent, mm
+from epuck_mj.check.source import Places
 from epuck_mj.errors import UserError
 from epuck_mj.scene.clearance import CLEARANCE_MAX, ClearanceProbe
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.outline import shell_outline
-from epuck_mj.scene.starts import FreeSpace, Grid, enclosed
+from epuck_mj.scene.starts import FreeSpace, Grid, enclosed, in_the_way
 from epuck_mj.step.control import START_CLEARANCE
 
 TOPIC = "room"
@@ -21,10 +23,17 @@ LEAK_TOLERANCE = 0.01
 """Share of the grid by which equal leaks may differ between two clearances."""
 
 
-def room_findings(scene: Scene, grid: Grid) -> list[Finding]:
+def room_findings(scene: Scene, grid: Grid, places: Places) -> list[Finding]:
     """The free region: its size and its parts, or why there is none."""
     place = Place(scene.arena)
     if not grid.inside.any():
+        blocker = in_the_way(scene, grid)
+        if blocker is not None:
+            geom, share = blocker
+            low, high = extent(scene.model, geom)
+            text = f"no room for a start: it is in the way at {share:.0%} of all "
+            text += f"places, from {mm(low)} to {mm(high)} above 0"
+            return [error(TOPIC, text, places.geom(geom))]
         return [error(TOPIC, _why_none(scene, grid), place)]
     node = grid.spacing**2
     floor = math.prod(grid.upper - grid.lower)
@@ -40,7 +49,7 @@ def room_findings(scene: Scene, grid: Grid) -> list[Finding]:
     parts = _parts(grid.inside)
     sizes = [f"{part.sum() * node:.3f}" for part in parts]
     if len(parts) > 1:
-        text = f"{len(parts)} separate regions of {', '.join(sizes)} m^2: a robot may "
+        text = f"{len(parts)} separate regions of {names(sizes)} m^2: a robot may "
         findings.append(warning(TOPIC, text + "never leave the one it is in", place))
     else:
         findings.append(info(TOPIC, "1 region: all of it can be reached"))
@@ -73,7 +82,10 @@ def _why_none(scene: Scene, grid: Grid) -> str:
             "no room for a start: between the walls the robot cannot keep "
             f"{1000 * START_CLEARANCE:.0f} mm from all of them"
         )
-    return "the walls enclose nothing: expected walls all around the robot"
+    return (
+        "the walls enclose nothing: expected walls all around the robot, with no gap "
+        "as wide as it (see --picture)"
+    )
 
 
 def _gap(grid: Grid, distance: np.ndarray) -> tuple[float, np.ndarray] | None:

@@ -12,14 +12,16 @@ import numpy as np
 from mujoco.batch import Batch
 from scipy import ndimage
 
-from epuck_mj.check.findings import Finding, Place, error, warning
+from epuck_mj.check.findings import Finding, error, warning
 from epuck_mj.check.heights import Heights, extent, mm
+from epuck_mj.check.source import Places
+from epuck_mj.check.walls import no_wall
 from epuck_mj.constants import BODY_RADIUS, PROXIMITY_RANGE
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.geometry import kinematics, seen_by_rays, walls
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.outline import geom_outlines
-from epuck_mj.scene.robot_parts import ROBOT_BODY, static
+from epuck_mj.scene.robot_parts import SHELL, of_robot, static
 from epuck_mj.scene.starts import Grid
 from epuck_mj.step.control import START_CLEARANCE
 
@@ -77,13 +79,13 @@ class Meetings:
 
 
 def sight_findings(
-    scene: Scene, grid: Grid, places: tuple[Place, ...], heights: Heights
+    scene: Scene, grid: Grid, places: Places, heights: Heights
 ) -> list[Finding]:
     """Findings about walls that rays do not see, and seen things that are no walls."""
     model = scene.model
     solid = walls(model)
     ghost = static(model) & ~solid & seen_by_rays(model)
-    ghost &= model.body_rootid[model.geom_bodyid] != model.body(ROBOT_BODY).id
+    ghost &= ~of_robot(model)
     met = _meetings(scene, grid, solid | ghost, sum(heights.rays) / 2)
     unseen = met.touches & (met.behind > PROXIMITY_RANGE)
     deep = met.touches & ~unseen & (met.behind > DEPTH)
@@ -91,26 +93,36 @@ def sight_findings(
     through = met.passes & (np.abs(met.behind) <= TOUCH)
     findings = []
     for geom in np.unique(met.geom).tolist():
-        of_geom, place = met.geom == geom, places[geom]
+        of_geom, place = met.geom == geom, places.geom(geom)
         if (of_geom & unseen).any():
             text = f"rays cannot see it: {_why(model, geom, heights)}"
-            text += _where(met.poses[of_geom & unseen])
-            findings.append(error(TOPIC, text, place))
+            where = _where(met.poses[of_geom & unseen])
+            findings.append(error(TOPIC, text, place, where))
         elif (of_geom & deep).any():
             depth = met.behind[of_geom & deep].max()
             text = f"rays see a wall {mm(depth)} behind where the shell touches it"
-            text += _where(met.poses[of_geom & deep])
-            findings.append(warning(TOPIC, text, place))
+            where = _where(met.poses[of_geom & deep])
+            findings.append(warning(TOPIC, text, place, where))
         elif (of_geom & blind).any():
             text = "too thin for single rays: straight ahead, a robot sees nothing "
-            text += f"until it crashes{_where(met.poses[of_geom & blind])}"
-            findings.append(warning(TOPIC, text, place))
+            where = _where(met.poses[of_geom & blind])
+            findings.append(warning(TOPIC, text + "until it crashes", place, where))
         elif (of_geom & through).any():
-            bits = f'contype="{model.geom_contype[geom]}" '
-            bits += f'conaffinity="{model.geom_conaffinity[geom]}"'
-            text = f"rays see it, but the shell cannot hit it: {bits}; expected 1 of a "
-            findings.append(warning(TOPIC, text + "wall", place))
+            findings.append(warning(TOPIC, no_wall(model, geom), place))
     return findings
+
+
+def same_view(scene: Scene, other: Scene) -> bool:
+    """Whether two robots hit and see alike in one arena, so one check will do."""
+    views = []
+    for one in (scene, other):
+        _, _, origin, direction = kinematics(one, np.zeros((1, 3)))
+        shell = one.model.geom(SHELL)
+        low, high = extent(one.model, shell.id)
+        views.append(
+            np.concatenate([*origin[0], *direction[0], shell.size, [low, high]])
+        )
+    return np.allclose(*views, rtol=0, atol=TOUCH / 10)
 
 
 def _why(model: mujoco.MjModel, geom: int, heights: Heights) -> str:
@@ -119,7 +131,10 @@ def _why(model: mujoco.MjModel, geom: int, heights: Heights) -> str:
     if not seen_by_rays(model)[geom]:
         material = model.geom_matid[geom]
         of = f" of material '{model.material(material).name}'" if material >= 0 else ""
-        return f"alpha 0{of}"
+        return f"alpha 0{of}; expected more"
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
+        size = " x ".join(f"{half:g}" for half in model.geom_size[geom, :2])
+        return f"rays see a plane within its size only, {size} m; expected more, or 0"
     if high < heights.rays[0]:
         return f"it ends at {mm(high)}, rays run at {mm(heights.rays[0])}"
     if low > heights.rays[1]:
@@ -151,7 +166,10 @@ def _meetings(scene: Scene, grid: Grid, geoms: np.ndarray, height: float) -> Mee
     met = probe.measure(poses)
     touches = np.abs(met.distance) <= TOUCH
     touches &= np.cos(met.direction - poses[:, 2]) >= FACING
-    behind = _rays(scene, poses, heading, height) - BODY_RADIUS
+    behind = np.full(len(poses), np.inf)
+    # the other places are not asked about
+    some = np.flatnonzero(touches | ~solid)
+    behind[some] = _rays(scene, poses[some], heading[some], height) - BODY_RADIUS
     deeper = probe.measure(poses + DEPTH * heading * [1, 1, 0]).distance
     return Meetings(
         index,
@@ -219,16 +237,17 @@ def _rays(
     geom = np.zeros(1, np.int32)
     middle = np.concatenate([poses[:, :2], np.full((len(poses), 1), height)], axis=1)
     left = np.cross([0, 0, 1], heading)
-    found = [
-        mujoco.mj_ray(model, data, origin, direction, None, 1, -1, geom)
-        for side in SIDES
-        for origin, direction in zip(middle + side * left, heading, strict=True)
-    ]
-    distance = np.array(found).reshape(len(SIDES), -1)
-    return np.where(distance < 0, np.inf, distance).min(axis=0)
+    distance = np.full(len(poses), np.inf)
+    for side in SIDES:
+        # what is seen where it is touched cannot be seen better
+        for i in np.flatnonzero(distance > BODY_RADIUS + TOUCH).tolist():
+            origin = middle[i] + side * left[i]
+            found = mujoco.mj_ray(model, data, origin, heading[i], None, 1, -1, geom)
+            distance[i] = min(distance[i], found if found >= 0 else np.inf)
+    return distance
 
 
-SIDES = (-0.01, -0.0005, 0.0005, 0.01)
+SIDES = (0.0005, -0.0005, 0.01, -0.01)
 """Distances of these rays to the left of the middle [m]."""
 
 

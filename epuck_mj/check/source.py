@@ -1,4 +1,4 @@
-"""Places of an arena's geoms in its XML files.
+"""Places of an arena's geoms and bodies in its XML files.
 
 MuJoCo names the line of an element, but not in files that are included. So elements are
 written into a single text, one a line, below lines that no attached model reaches.
@@ -6,13 +6,16 @@ written into a single text, one a line, below lines that no attached model reach
 
 import re
 import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import mujoco
 
-from epuck_mj.check.findings import Place, Unusable, error
-from epuck_mj.scene.source_files import SourceFiles, source_files
+from epuck_mj.check.findings import Finding, Place, Unusable, error, names
+from epuck_mj.scene.mjcf import WHOLE_MODEL
+from epuck_mj.scene.source_files import SourceFiles, named_files, source_files
 from epuck_mj.scene.xml_elements import ELEMENTS_MAX, BadXml, Element
 
 TOPIC = "file"
@@ -41,8 +44,28 @@ def place_of(problem: BadXml) -> Place:
     return _place_of(problem.element)
 
 
-def geom_places(files: SourceFiles) -> tuple[Place, ...]:
-    """Where each geom of an arena was written, in the model's order.
+@dataclass(frozen=True)
+class Places:
+    """Where an arena's geoms and bodies were written, in the model's order.
+
+    What a robot brings comes behind them, and was not written in the arena.
+    """
+
+    geoms: tuple[Place, ...]
+    bodies: tuple[Place, ...]
+    main: Place
+
+    def geom(self, geom: int) -> Place:
+        """Place of a geom by its index in the model."""
+        return self.geoms[geom] if geom < len(self.geoms) else self.main
+
+    def body(self, body: int) -> Place:
+        """Place of a body by its index in the model."""
+        return self.bodies[body] if body < len(self.bodies) else self.main
+
+
+def places_of(files: SourceFiles) -> Places:
+    """The places of an arena's parts.
 
     Raises:
         Unusable: if MuJoCo cannot compile the arena, with the line that it names.
@@ -51,6 +74,8 @@ def geom_places(files: SourceFiles) -> tuple[Place, ...]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             spec = mujoco.MjSpec.from_string(_one_text(files))
+            for name, value in WHOLE_MODEL.items():
+                setattr(spec.compiler, name, value)
             spec.compile()
     except REFUSALS as problem:
         message = " ".join(str(problem).split())
@@ -59,25 +84,44 @@ def geom_places(files: SourceFiles) -> tuple[Place, ...]:
         text = re.sub(r"^(XML )?(Error: )+", "", text)
         place = _place(files, message)
         raise Unusable(error(TOPIC, f"MuJoCo: {text}", place)) from None
-    geoms = {geom.id: _place(files, geom.info) for geom in spec.geoms}
-    return tuple(geoms[i] for i in range(len(geoms)))
+    return Places(
+        _in_order(files, "geom", spec.geoms),
+        _in_order(files, "body", spec.bodies),
+        Place(files.main),
+    )
 
 
-def settings_not_used(files: SourceFiles) -> list[Element]:
-    """Elements of an arena with physics that is the robot's own in a scene."""
+def missing_files(files: SourceFiles) -> list[Finding]:
+    """An error for files that elements name and that are not there."""
+    if not files.missing:
+        return []
+    named = [f"'{name}'" for e in files.missing for name in named_files(e)]
+    return [error(TOPIC, f"no file {names(named)}", _place_of(files.missing[0]))]
+
+
+def settings_not_used(files: SourceFiles) -> list[str]:
+    """What an arena says of physics that is the robot's own in a scene, as text."""
     inside = False
     found = []
+    touch: dict[str, list[str]] = {name: [] for name in TOUCH}
     for element in files.elements:
         if element.depth == 1:
             inside = element.tag in ("option", "size")
         whole = element.tag == "compiler" and not WHOLE.isdisjoint(element.attributes)
         if whole or (inside and element.attributes):
-            found.append(element)
-    return found
+            found.append(f"{element.shown} of line {element.line}")
+        for name in TOUCH if element.tag == "geom" else ():
+            if element.attributes.get(name, "0").strip("0. "):
+                touch[name].append(f"line {element.line}")
+    lines = [(name, lines) for name, lines in touch.items() if lines]
+    return found + [f"{name} of geoms ({names(lines)})" for name, lines in lines]
 
 
 WHOLE = {"settotalmass", "boundmass", "boundinertia", "balanceinertia"}
 """Settings of the compiler that would change masses of the robot."""
+
+TOUCH = ("margin", "gap", "priority")
+"""Attributes of geoms that would change how the robot touches them."""
 
 
 def _one_text(files: SourceFiles) -> str:
@@ -104,12 +148,25 @@ def _absolute(files: SourceFiles, key: str, value: str) -> str:
     return value
 
 
-def _place(files: SourceFiles, said: str) -> Place:
+def _in_order(
+    files: SourceFiles, tag: str, parts: Sequence[mujoco.MjsGeom | mujoco.MjsBody]
+) -> tuple[Place, ...]:
+    """Where parts of one kind were written, by their indices in the model."""
+    found = {part.id: _place(files, part.info, tag) for part in parts}
+    return tuple(found[i] for i in range(len(found)))
+
+
+def _place(files: SourceFiles, said: str, tag: str = "") -> Place:
     """The element on the line that a text of MuJoCo's names, else the whole arena."""
     named = re.search(r"\bline (\d+)", said)
-    line = int(named[1]) - ELEMENTS_MAX - 1 if named else -1
+    line_said = int(named[1]) if named else 0
+    line = line_said - ELEMENTS_MAX - 1
     if 0 <= line < len(files.elements):
         return _place_of(files.elements[line])
+    # lines of attached models are those of their own files
+    there = [e for e in files.attached if e.tag == tag and e.line == line_said]
+    if len(there) == 1:
+        return _place_of(there[0])
     # of files that cannot be opened, it says the name only
     for element in files.elements:
         if f"'{element.attributes.get('file')}'" in said:

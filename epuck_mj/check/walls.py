@@ -1,4 +1,4 @@
-"""Findings about the geoms of an arena, one by one."""
+"""Findings about the geoms of an arena."""
 
 from collections import Counter
 
@@ -6,18 +6,19 @@ import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from epuck_mj.check.findings import Finding, Place, error, info, warning
+from epuck_mj.check.findings import Finding, Place, error, info, names, warning
 from epuck_mj.check.heights import Heights, extent, mm
+from epuck_mj.check.source import Places
 from epuck_mj.scene.clearance import MEASURED
+from epuck_mj.scene.floor import floors
 from epuck_mj.scene.geometry import at_rest, box_around_walls, mesh, seen_by_rays, walls
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.outline import geom_outlines, within
-from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL, can_touch, static
+from epuck_mj.scene.robot_parts import SHELL, can_touch, of_robot, static
 from epuck_mj.scene.starts import Grid
 from epuck_mj.step.control import START_CLEARANCE
 
 TOPIC = "walls"
-NAMES_MAX = 6
 
 FAR = 1e4
 """Distance beyond any wall [m]."""
@@ -28,40 +29,95 @@ CONCAVE = 0.01
 _SHAPE = mujoco.mjtGeom
 
 
-def finite_findings(model: mujoco.MjModel, places: tuple[Place, ...]) -> list[Finding]:
+def finite_findings(model: mujoco.MjModel, places: Places) -> list[Finding]:
     """Errors for geoms so far away that nothing can be measured with them."""
     data = at_rest(model)
     values = np.concatenate([data.geom_xpos, data.geom_xmat, model.geom_size], axis=1)
     nowhere = ~(np.abs(values) < FAR).all(axis=1)
     return [
-        error(TOPIC, f"expected finite numbers below {FAR:g} m", places[geom])
+        error(TOPIC, f"expected finite numbers below {FAR:g} m", places.geom(geom))
         for geom in np.flatnonzero(nowhere).tolist()
     ]
 
 
-def floor_findings(scene: Scene, places: tuple[Place, ...]) -> list[Finding]:
-    """Information about what is taken for the floor though its bits are a wall's."""
-    names = [places[geom].element or "<geom>" for geom in scene.floor]
-    if not names:
-        return []
-    text = f"taken as the floor, since level at height 0: {', '.join(names)}"
-    return [info("floor", text)]
+def shape_findings(model: mujoco.MjModel, places: Places) -> list[Finding]:
+    """Errors for walls whose distance cannot be measured."""
+    return [
+        error(
+            TOPIC,
+            f"a wall cannot be of type {_kind(model, geom)}: clearance to it has no "
+            "measure; expected box, plane, cylinder, capsule, ellipsoid, sphere, mesh",
+            places.geom(geom),
+        )
+        for geom in np.flatnonzero(walls(model)).tolist()
+        if _SHAPE(model.geom_type[geom]) not in MEASURED
+    ]
+
+
+def floor_findings(scene: Scene, places: Places) -> list[Finding]:
+    """Information about the floor, if it is not at 0 or its bits are a wall's."""
+    there = np.flatnonzero(floors(scene.model, scene.height)).tolist()
+    shown = names([places.geom(geom).element or "<geom>" for geom in there])
+    findings = []
+    if scene.height:
+        height = f"{mm(scene.height)}: on {shown}"
+        findings.append(info("floor", f"robots stand at height {height}"))
+    if scene.floor:
+        shown = names([places.geom(geom).element or "<geom>" for geom in scene.floor])
+        text = f"taken as the floor, since level at height {mm(scene.height)}: {shown}"
+        findings.append(info("floor", text))
+    return findings
 
 
 def wall_findings(
-    scene: Scene, grid: Grid, places: tuple[Place, ...], heights: Heights
+    scene: Scene, grid: Grid, places: Places, heights: Heights
 ) -> list[Finding]:
     """Findings about the geoms of an arena."""
     model = scene.model
-    robot = model.body_rootid == model.body(ROBOT_BODY).id
     findings = _found(model)
-    for geom in np.flatnonzero(~robot[model.geom_bodyid]).tolist():
-        place = places[geom]
-        if not static(model)[geom]:
-            findings += _moving(model, geom, place)
-        elif walls(model)[geom]:
-            findings += _wall(scene, grid, geom, place, heights)
+    for geom in np.flatnonzero(walls(model)).tolist():
+        findings += _wall(scene, grid, geom, places.geom(geom), heights)
     return findings
+
+
+def moving_findings(model: mujoco.MjModel, places: Places) -> list[Finding]:
+    """Warnings of things that move and that the shell can hit or rays can see."""
+    moves = ~static(model) & ~of_robot(model)
+    hit, seen = can_touch(model, model.geom(SHELL).id), seen_by_rays(model)
+    tree = model.body_rootid[model.geom_bodyid]
+    findings = []
+    for body in np.unique(tree[moves & (hit | seen)]).tolist():
+        its = moves & (tree == body)
+        does = [
+            *(["touching it is a crash"] if (its & hit).any() else []),
+            *(["rays see it"] if (its & seen).any() else []),
+        ]
+        text = f"it moves, so it is no wall: {' and '.join(does)}, but no clearance "
+        findings.append(warning(TOPIC, f"{text}or figure has it", places.body(body)))
+    return findings
+
+
+def untouched_findings(
+    model: mujoco.MjModel, places: Places, heights: Heights
+) -> list[Finding]:
+    """Warnings of what stands where a shell is, but cannot be hit by it."""
+    others = static(model) & ~of_robot(model) & ~walls(model)
+    others &= model.geom_type != _SHAPE.mjGEOM_PLANE
+    findings = []
+    for geom in np.flatnonzero(others & seen_by_rays(model)).tolist():
+        low, high = extent(model, geom)
+        if high > heights.shell[0] and low < heights.shell[1]:
+            findings.append(warning(TOPIC, no_wall(model, geom), places.geom(geom)))
+    return findings
+
+
+def no_wall(model: mujoco.MjModel, geom: int) -> str:
+    """Why a geom that rays see is no wall."""
+    return (
+        "rays see it, but the shell cannot hit it: "
+        f'contype="{model.geom_contype[geom]}" '
+        f'conaffinity="{model.geom_conaffinity[geom]}"; expected 1 of a wall'
+    )
 
 
 def _found(model: mujoco.MjModel) -> list[Finding]:
@@ -71,8 +127,7 @@ def _found(model: mujoco.MjModel) -> list[Finding]:
     if box is None:
         return []
     kinds = Counter(_kind(model, geom) for geom in geoms)
-    names = [model.geom(geom).name or "no name" for geom in geoms]
-    more = f" and {len(names) - NAMES_MAX} more" if len(names) > NAMES_MAX else ""
+    named = [name for geom in geoms if (name := model.geom(geom).name)]
     size = box[1] - box[0]
     return [
         info(
@@ -80,7 +135,7 @@ def _found(model: mujoco.MjModel) -> list[Finding]:
             f"{len(geoms)} found: "
             + ", ".join(f"{count} of type {kind}" for kind, count in kinds.items()),
         ),
-        info(TOPIC, f"names: {', '.join(names[:NAMES_MAX])}{more}"),
+        *([info(TOPIC, f"names: {names(named)}")] if named else []),
         info(
             TOPIC,
             f"box around them: x {box[0][0]:.3f} to {box[1][0]:.3f} m, "
@@ -95,15 +150,13 @@ def _wall(
     scene: Scene, grid: Grid, geom: int, place: Place, heights: Heights
 ) -> list[Finding]:
     """Finding about a geom that the shell can hit, if robots do not meet it."""
-    if _SHAPE(scene.model.geom_type[geom]) not in MEASURED:
-        kind = _kind(scene.model, geom)
-        text = f"a wall cannot be of type {kind}: clearance to it has no measure"
-        return [error(TOPIC, text, place)]
     low, high = extent(scene.model, geom)
     if high <= heights.shell[0]:
         if high > heights.shell[0] - START_CLEARANCE:
             text = "it lies below the shell, which may start nowhere near it; expected "
-            return [error(TOPIC, f"{text}a floor at height 0", place)]
+            at = f"the floor at its height, now {mm(scene.height)}, or "
+            text += f'{at}contype="0" conaffinity="0" of what robots drive over'
+            return [error(TOPIC, text, place)]
         below = f"the robot passes above it: it ends at {mm(high)}"
     elif low >= heights.shell[1]:
         below = f"the robot passes below it: it begins at {mm(low)}"
@@ -113,16 +166,6 @@ def _wall(
     (outline,) = geom_outlines(scene, np.arange(scene.model.ngeom) == geom)
     meets = within(outline, grid.nodes[grid.inside]).any()
     return [warning(TOPIC, below, place)] if meets else []
-
-
-def _moving(model: mujoco.MjModel, geom: int, place: Place) -> list[Finding]:
-    """Finding about a moving geom that the shell can hit or rays can see."""
-    hit = can_touch(model, model.geom(SHELL).id)[geom]
-    if not hit and not seen_by_rays(model)[geom]:
-        return []
-    does = "touching it is a crash" if hit else "rays see it"
-    text = f"it moves, so it is no wall: {does}, but no clearance or figure has it"
-    return [warning(TOPIC, text, place)]
 
 
 def _mesh(model: mujoco.MjModel, geom: int, place: Place) -> list[Finding]:

@@ -1,8 +1,7 @@
 """Clearance: how far the shell is from the nearest wall, by true geometry.
 
-MuJoCo's own distance between convex shapes, so any arena will do. It is measured in a
-separate model with only the walls and the shell, since a whole scene would also compute
-the robot's rays for every pose.
+MuJoCo's own distance between convex shapes, so any arena will do. Of many walls, only
+those near a pose are measured, which changes no result.
 
 The robot stands upright on its start height, as on a flat floor. Distances are those in
 space, which beside upright walls are those in the plane.
@@ -12,26 +11,31 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from mujoco.batch import Batch
 
 from epuck_mj.errors import UserError
-from epuck_mj.scene.geometry import mesh, walls
+from epuck_mj.scene.geometry import boxes, walls
 from epuck_mj.scene.model import Scene
+from epuck_mj.scene.nearest import CLEARANCE_MAX, NearestWall, at_start
 from epuck_mj.scene.robot_parts import SHELL
 
-CLEARANCE_MAX = 0.2
-"""Clearance beyond which the nearest wall is not looked for, to save time [m]."""
+PROBES_MAX = 500
+"""Most groups of walls that are kept for the next measurement."""
 
-CHUNK = 8192
-"""Number of poses measured at once: bounds memory, changes no result."""
+CHUNK, FEW = 8192, 256
+"""Numbers of poses measured at once, by one probe or by one of many.
 
-TOLERANCE = 1e-9
-"""Tolerance of distances [m]: with MuJoCo's 1e-6 directions are wrong near contact."""
+They bound memory and change no result.
+"""
 
-ITERATIONS = 200
-"""Most iterations of MuJoCo's distances; most shapes need ten."""
+WALLS_MAX = 30
+"""Most walls that are all measured for every pose; of more, those near it."""
 
-_SHAPE, _SENSOR, _OBJECT = mujoco.mjtGeom, mujoco.mjtSensor, mujoco.mjtObj
+SQUARES = ((0.4, 0.06), (0.8, CLEARANCE_MAX))
+"""Squares whose poses are measured with the same walls: their sides, and how far from
+a shell walls are looked for [m]. The second are for poses beside which the first found
+none."""
+
+_SHAPE = mujoco.mjtGeom
 
 MEASURED = {
     _SHAPE.mjGEOM_PLANE,
@@ -43,8 +47,6 @@ MEASURED = {
     _SHAPE.mjGEOM_MESH,
 }
 """Shapes with an exact distance; a mesh counts as its hull, as in collisions."""
-
-_ROBOT = "robot"
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,7 @@ class ClearanceProbe:
     """Measures clearance in one scene."""
 
     def __init__(self, scene: Scene, threads: int = 0):
-        """Copy walls and shell.
+        """Look at the walls.
 
         Args:
             scene: robot and arena.
@@ -75,87 +77,74 @@ class ClearanceProbe:
         Raises:
             UserError: if a shape has no exact distance.
         """
-        self._batch = Batch(_walls_and_shell(scene), CHUNK, threads)
-        self._qpos = self._batch.bind("qpos")
-        self._sensordata = self._batch.bind("sensordata")
+        self._scene, self._threads = scene, threads
+        solid = walls(scene.model)
+        _check_shapes(scene, solid)
+        self._walls = np.flatnonzero(solid)
+        self._data = at_start(scene)
+        self._probes: dict[tuple[int, ...], NearestWall] = {}
+        self._many = self._walls.size > WALLS_MAX
+        if self._many:
+            low, high = boxes(scene.model, self._walls)
+            self._low, self._high = low[:, :2], high[:, :2]
 
     def measure(self, poses: np.ndarray) -> Clearance:
         """Clearance `(...)` on poses `(..., 3)`: x, y [m], yaw [rad], or NaN."""
         distance = np.full(poses.shape[:-1], np.nan)
         direction = np.full(poses.shape[:-1], np.nan)
         there = np.isfinite(poses).all(axis=-1)
-        found = [self._measure(chunk) for chunk in _chunks(poses[there])]
-        if found:
-            distance[there], direction[there] = np.concatenate(found, axis=1)
+        distance[there], direction[there] = self._measure(poses[there])
         return Clearance(distance, direction)
 
     def _measure(self, poses: np.ndarray) -> np.ndarray:
         """Distance and direction `(2, n)` on `(n, 3)` poses."""
-        ids = np.arange(len(poses), dtype=np.int32)
-        self._qpos[ids] = poses
-        self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_POS.value)
-        sensed = self._sensordata[ids]
-        # from the axis: from the shell, it would have no direction at contact
-        to_wall = sensed[:, 4:6] - poses[:, :2]
-        direction = np.arctan2(to_wall[:, 1], to_wall[:, 0])
-        direction[sensed[:, 0] >= CLEARANCE_MAX] = np.nan
-        return np.stack([sensed[:, 0], direction])
+        if not self._many:
+            return self._probe(self._walls).measure(poses)
+        found, rest = np.empty((2, len(poses))), np.arange(len(poses))
+        for side, reach in SQUARES:
+            for part in _by_square(poses[rest], side):
+                which = rest[part]
+                near = self._near(poses[which[0]], side, reach)
+                found[:, which] = self._probe(near).measure(poses[which])
+            # a wall that was left out may be as near
+            rest = rest[found[0, rest] >= reach]
+        return found
+
+    def _near(self, pose: np.ndarray, side: float, reach: float) -> np.ndarray:
+        """Walls within reach of shells whose axis is in the square of a pose `(3,)`."""
+        shell = self._scene.model.geom(SHELL)
+        reach += shell.rbound.item() + np.hypot(*shell.pos[:2])
+        low = side * np.floor(pose[:2] / side)
+        near = (self._high > low - reach) & (self._low < low + side + reach)
+        return self._walls[near.all(axis=1)]
+
+    def _probe(self, near: np.ndarray) -> NearestWall:
+        """The probe of some walls, by their indices."""
+        key = tuple(near.tolist())
+        if key not in self._probes:
+            if len(self._probes) == PROBES_MAX:
+                self._probes.clear()
+            # of many, each takes as little as it can
+            size, threads = (FEW, 1) if self._many else (CHUNK, self._threads)
+            made = NearestWall(self._scene.model, self._data, key, size, threads)
+            self._probes[key] = made
+        return self._probes[key]
 
 
-def _chunks(poses: np.ndarray) -> list[np.ndarray]:
-    return [poses[i : i + CHUNK] for i in range(0, len(poses), CHUNK)]
+def _by_square(poses: np.ndarray, side: float) -> list[np.ndarray]:
+    """Indices of poses `(n, 3)` by the square of a side [m] that they are in."""
+    square = np.floor(poses[:, :2] / side)
+    order = np.lexsort(square.T)
+    new = np.diff(square[order], axis=0).any(axis=1)
+    return np.split(order, np.flatnonzero(new) + 1) if len(poses) else []
 
 
-def _walls_and_shell(scene: Scene) -> mujoco.MjModel:
-    """A model of the walls and of the shell on x, y and yaw, with two sensors.
-
-    They give the least distance, and its two points: the shell's, then the wall's.
-    """
-    model, data = scene.model, mujoco.MjData(scene.model)
-    data.qpos[:] = scene.qpos(np.zeros(3))
-    mujoco.mj_kinematics(model, data)
-    spec = mujoco.MjSpec()
-    spec.option.ccd_tolerance, spec.option.ccd_iterations = TOLERANCE, ITERATIONS
-    for geom in np.flatnonzero(walls(model)).tolist():
-        shape = _SHAPE(model.geom_type[geom])
+def _check_shapes(scene: Scene, solid: np.ndarray) -> None:
+    for geom in np.flatnonzero(solid).tolist():
+        shape = _SHAPE(scene.model.geom_type[geom])
         if shape not in MEASURED:
             name = shape.name.removeprefix("mjGEOM_").lower()
             raise UserError(
                 f"arena '{scene.arena}': no clearance to a wall that is a {name}; "
                 "expected plane, box, cylinder, capsule, ellipsoid, sphere or mesh"
             )
-        _copy(spec, spec.worldbody, model, data, geom)
-    robot = spec.worldbody.add_body(name=_ROBOT)
-    slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
-    for kind, axis in zip((slide, slide, hinge), np.eye(3), strict=True):
-        robot.add_joint(type=kind, axis=axis)
-    _copy(spec, robot, model, data, model.geom(SHELL).id)
-    for kind in (_SENSOR.mjSENS_GEOMDIST, _SENSOR.mjSENS_GEOMFROMTO):
-        # between bodies: the nearest of all pairs of their geoms
-        spec.add_sensor(
-            type=kind,
-            objtype=_OBJECT.mjOBJ_BODY,
-            objname=_ROBOT,
-            reftype=_OBJECT.mjOBJ_BODY,
-            refname="world",
-            cutoff=CLEARANCE_MAX,
-        )
-    return spec.compile()
-
-
-def _copy(spec, body, model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> None:
-    """Add a compiled geom to a body at the origin; it collides with nothing."""
-    quaternion = np.zeros(4)
-    mujoco.mju_mat2Quat(quaternion, data.geom_xmat[geom])
-    copy = body.add_geom(
-        type=model.geom_type[geom],
-        size=model.geom_size[geom],
-        pos=data.geom_xpos[geom],
-        quat=quaternion,
-        contype=0,
-        conaffinity=0,
-    )
-    if model.geom_type[geom] == _SHAPE.mjGEOM_MESH:
-        vertices, _ = mesh(model, geom)
-        copy.meshname = f"mesh of geom {geom}"
-        spec.add_mesh(name=copy.meshname, uservert=vertices.ravel())

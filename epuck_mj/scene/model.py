@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 
 from epuck_mj.errors import UserError
-from epuck_mj.scene.floor import check_contacts, check_floor
+from epuck_mj.scene.floor import check_floor
 from epuck_mj.scene.mjcf import compiled
 from epuck_mj.scene.model_files import find_arena, find_robot
 from epuck_mj.scene.robot_parts import (
@@ -49,6 +49,7 @@ class Scene:
         arena: path of the arena's MJCF.
         sha256: of each file compiled: `arena`, `robot`, and all others by path.
         floor: indices of geoms that were made a floor, whatever their bits were.
+        height: of the floor that the robot stands on [m].
     """
 
     model: mujoco.MjModel
@@ -59,6 +60,7 @@ class Scene:
     arena: Path
     sha256: Mapping[str, str]
     floor: tuple[int, ...]
+    height: float
     _distance: np.ndarray
     _contact: int
 
@@ -145,8 +147,7 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
     model = made.model
     check_base(model, robot_path)
     index_of(model, _OBJECT.mjOBJ_GEOM, SHELL, robot_path)
-    check_contacts(model, arena_path)
-    check_floor(model, arena_path)
+    check_floor(model, made.height, arena_path)
     wheels = [
         index_of(model, _OBJECT.mjOBJ_ACTUATOR, name, robot_path) for name in WHEELS
     ]
@@ -176,6 +177,7 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
         arena_path,
         made.sha256,
         made.floor,
+        made.height,
         np.array(distance),
         contact,
     )

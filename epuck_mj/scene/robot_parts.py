@@ -49,6 +49,11 @@ def static(model: mujoco.MjModel) -> np.ndarray:
     return model.body_weldid[model.geom_bodyid] == 0
 
 
+def of_robot(model: mujoco.MjModel) -> np.ndarray:
+    """Which geoms are the robot's, `(ngeom,)`."""
+    return model.body_rootid[model.geom_bodyid] == model.body(ROBOT_BODY).id
+
+
 def can_touch(model: mujoco.MjModel, geom: int) -> np.ndarray:
     """Which geoms a geom can touch, by their collision bits, `(ngeom,)`."""
     bits, masks = model.geom_contype, model.geom_conaffinity

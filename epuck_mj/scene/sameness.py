@@ -24,8 +24,11 @@ KINDS = {
 RELATIVE = 1e-12
 """Largest relative difference of equal numbers: another order of sums is no change."""
 
-PLACES = ("adr", "id", "num", "sameframe", "treeid")
-"""Endings of fields that say where in the model something is, not what it is."""
+PLACES = ("adr", "id", "num", "sameframe", "treeid", "user")
+"""Endings of fields that say where in the model something is, not what it is.
+
+And of data for a user's own program, whose number is the arena's choice.
+"""
 
 
 def check_same(model: mujoco.MjModel, alone: mujoco.MjModel, arena: Path) -> None:

@@ -149,7 +149,7 @@ def _add_assets(found: SourceFiles) -> None:
         if element.tag == "compiler" and directory in element.attributes
     }
     for element in everything:
-        for name in _named(element):
+        for name in named_files(element):
             places = {
                 _normal(start / folder / inner)
                 for start in (found.main.parent, element.file.parent)
@@ -163,7 +163,7 @@ def _add_assets(found: SourceFiles) -> None:
                 found.missing.append(element)
 
 
-def _named(element: Element) -> Iterator[str]:
+def named_files(element: Element) -> Iterator[str]:
     """Names of files in an element, by `file`, `fileright` and the like."""
     for key, value in element.attributes.items():
         if key.startswith("file") and value:

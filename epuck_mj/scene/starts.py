@@ -13,7 +13,7 @@ from mujoco.batch import Batch
 from scipy import ndimage
 
 from epuck_mj.errors import UserError
-from epuck_mj.scene.geometry import box_around_walls
+from epuck_mj.scene.geometry import box_around_walls, walls
 from epuck_mj.scene.model import Scene, once_per_model
 from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL
 
@@ -25,6 +25,12 @@ SPACING_MIN = 0.01
 
 SIZE_MAX = 35.0
 """Longest side of an arena [m]: 500 times the robot's diameter."""
+
+PROBED = 200
+"""Number of places at which it is looked up what is in the way."""
+
+IN_THE_WAY = 0.8
+"""Least share of places at which one geom alone is in the way of all robots."""
 
 BLOCK = 64
 """Number of candidates drawn at once; changing it changes all starts."""
@@ -93,7 +99,8 @@ def survey(scene: Scene, clearance: float) -> Grid:
     if not (upper - lower).max() < SIZE_MAX:
         raise UserError(
             f"arena '{scene.arena}' is {(upper - lower).max():g} m wide: expected less "
-            f"than {SIZE_MAX:g} m, 500 robots; are its lengths in millimetres?"
+            f"than {SIZE_MAX:g} m, 500 times the robot's width of 7 cm; are its "
+            "lengths in millimetres?"
         )
     # one shell's width of outside all around
     border = 2 * scene.model.geom(SHELL).rbound.item() + clearance
@@ -164,9 +171,36 @@ class FreeSpace:
         )
 
 
+def in_the_way(scene: Scene, grid: Grid) -> tuple[int, float] | None:
+    """A geom that alone leaves no room for most robots between the walls, if any.
+
+    Returns:
+        Its index, and the share of places at which it is in the way.
+    """
+    model = _with_margin(scene.model, 0)
+    if walls(model).sum() < 2:
+        return None
+    data, shell = mujoco.MjData(model), model.geom(SHELL).id
+    within = ((grid.nodes > grid.lower) & (grid.nodes < grid.upper)).all(axis=-1)
+    places = grid.nodes[within][:: max(1, within.sum() // PROBED)]
+    blocking = np.zeros(model.ngeom)
+    for place in places:
+        data.qpos[:] = scene.qpos(np.array([*place, 0]))
+        mujoco.mj_fwdPosition(model, data)
+        pairs = {frozenset(contact.geom.tolist()) for contact in data.contact}
+        met = {geom for pair in pairs if shell in pair for geom in pair - {shell}}
+        blocking[list(met)] += 1
+    share = blocking / max(1, len(places))
+    most = int(share.argmax())
+    return (most, float(share[most])) if share[most] >= IN_THE_WAY else None
+
+
 def _with_margin(model: mujoco.MjModel, clearance: float) -> mujoco.MjModel:
     """The model with a shell that touches things already at a clearance [m]."""
     model = copy.copy(model)
+    # of its sensors, only the contact counts: rays cost most
+    rays = model.sensor_type == mujoco.mjtSensor.mjSENS_RANGEFINDER
+    model.sensor_needstage[rays] = mujoco.mjtStage.mjSTAGE_ACC
     model.geom_margin[model.geom(SHELL).id] = clearance
     model.body_margin[model.body(ROBOT_BODY).id] = clearance
     return model
