@@ -10,7 +10,7 @@ from epuck_mj.rungs.bodies import SPARE_SPEED
 from epuck_mj.rungs.kinematic.cut import UPRIGHT, NoOutline, Outlines, add_outline
 from epuck_mj.scene.geometry import at_rest, kinematics, seen_by_rays, walls
 from epuck_mj.scene.model import Scene, once_per_model
-from epuck_mj.scene.robot_parts import PROXIMITY, ROBOT_BODY, SHELL, WHEELS, static
+from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL, WHEELS, static
 
 SUBSTEP = 0.01
 """Longest time between two looks at whether the shell touches a wall [s].
@@ -204,9 +204,9 @@ def _outlines(scene: Scene, solid: bool) -> tuple[np.ndarray, np.ndarray]:
         name = model.geom(moving[0]).name or f"number {moving[0]}"
         raise _uncut(scene, name, "it moves")
     shell = model.geom(SHELL)
-    low, high = shell.pos[2] + shell.size[1] * np.array([-1, 1])
+    low, high = data.geom_xpos[shell.id, 2] + shell.size[1] * np.array([-1, 1])
     if not solid:
-        low = high = model.site(PROXIMITY[0]).pos[2]
+        low = high = kinematics(scene, np.zeros((1, 3)))[2][0, 0, 2]
     found = Outlines()
     for geom in np.flatnonzero(geoms).tolist():
         try:
