@@ -6,12 +6,9 @@ long after that moment its wheels are told to stand.
 """
 
 import contextlib
-import fcntl
 import os
 import select
 import socket
-import struct
-import termios
 import threading
 import time
 import tty
@@ -147,9 +144,10 @@ class Peer:
     Attributes:
         wrong: makes what says it.
         links: where it can.
-        reads: whether it takes what it is told from the line.
+        reads: whether it takes what it is told from the line; else it only looks at it.
         hangs_up: whether it first ends the connection.
         returns: whether it can be connected to after that.
+        floods: whether it says as much as it can.
     """
 
     wrong: Callable[[], Wrong]
@@ -157,20 +155,21 @@ class Peer:
     reads: bool = True
     hangs_up: bool = False
     returns: bool = True
+    floods: bool = False
 
 
 PEERS = {
     "silence": Peer(silence),
-    "deaf": Peer(silence, reads=False),
-    "flood of readings": Peer(flood(PACKET), ("wifi",)),
-    "flood of empty packets": Peer(flood(b"\x03"), ("wifi",)),
-    "flood of images": Peer(flood(b"\x01" + bytes(38_400)), ("wifi",)),
-    "flood of replies": Peer(flood(REPLY), ("pty", "tcp")),
-    "flood of lines": Peer(flood(b"s\r\n"), ("pty", "tcp")),
-    "flood, deaf": Peer(flood(PACKET), reads=False),
-    "babble": Peer(babble),
+    "deaf": Peer(silence, ("tcp", "wifi"), reads=False),
+    "flood of readings": Peer(flood(PACKET), ("wifi",), floods=True),
+    "flood of empty packets": Peer(flood(b"\x03"), ("wifi",), floods=True),
+    "flood of images": Peer(flood(b"\x01" + bytes(38_400)), ("wifi",), floods=True),
+    "flood of replies": Peer(flood(REPLY), ("pty", "tcp"), floods=True),
+    "flood of lines": Peer(flood(b"s\r\n"), ("pty", "tcp"), floods=True),
+    "flood, deaf": Peer(flood(PACKET), ("tcp", "wifi"), reads=False, floods=True),
+    "babble": Peer(babble, floods=True),
     "slow babble": Peer(paced(b"?", 0.03)),
-    "endless banner": Peer(flood(b"\f\a" + BANNER + b"\r\n")),
+    "endless banner": Peer(flood(b"\f\a" + BANNER + b"\r\n"), floods=True),
     "slow banner": Peer(paced(b"\f\a" + BANNER + b"\r\n", 0.1)),
     "late answers": Peer(late(0.45)),
     "half packets": Peer(halves),
@@ -180,8 +179,10 @@ PEERS = {
     "saturated": Peer(saturated),
     "hangs up": Peer(silence, hangs_up=True, returns=False),
     "hangs up, returns mute": Peer(silence, hangs_up=True),
-    "hangs up, returns babbling": Peer(babble, hangs_up=True),
-    "hangs up, returns flooding": Peer(flood(PACKET), ("tcp", "wifi"), hangs_up=True),
+    "hangs up, returns babbling": Peer(babble, hangs_up=True, floods=True),
+    "hangs up, returns flooding": Peer(
+        flood(PACKET), ("tcp", "wifi"), hangs_up=True, floods=True
+    ),
 }
 """Ways to go wrong, by name."""
 
@@ -262,8 +263,7 @@ class Hostile(threading.Thread):
         self._robot.output(now)
         self._end = threading.Event()
         self._backlog = b""
-        self._pending: list[tuple[float, int]] = []
-        self._n_heard = 0
+        self._n_seen = 0
         self.met: float | None = None
         self.fault: float | None = None
         self.lateness = 0.0
@@ -313,7 +313,6 @@ class Hostile(threading.Thread):
                 self.lateness = max(
                     self.lateness, time.monotonic() - began - (0 if busy else TICK)
                 )
-            self._hear_the_rest()
         finally:
             for end in (self._line, self._server):
                 if end is not None:
@@ -327,14 +326,12 @@ class Hostile(threading.Thread):
         """Hear and say something; whether there is more to say."""
         if self._line is None and not self._accept():
             return False
-        heard = self._hear(now)
+        heard = self._hear()
         if heard and self.met is None:
             self.met = now
-        right = b""
-        if self.fault is None or self._peer.reads:
-            self._body.now = now
-            self._robot.feed(heard, now)
-            right = self._robot.output(now)
+        self._body.now = now
+        self._robot.feed(heard, now)
+        right = self._robot.output(now)
         self._go_wrong(now)
         if self.fault is None:
             said = right
@@ -354,6 +351,7 @@ class Hostile(threading.Thread):
         except BlockingIOError:
             return False
         self._line.setblocking(False)
+        self._n_seen = 0
         return True
 
     def _go_wrong(self, now: float) -> None:
@@ -375,34 +373,20 @@ class Hostile(threading.Thread):
             if self._server is None and self._peer.returns:
                 self._line = _Master(self._path)
 
-    def _hear(self, now: float) -> bytes:
+    def _hear(self) -> bytes:
         assert self._line is not None
-        if self.fault is not None and not self._peer.reads:
-            with contextlib.suppress(OSError):
-                waiting = fcntl.ioctl(self._line, termios.FIONREAD, bytes(4))
-                self._pending.append((now, *struct.unpack("i", waiting)))
-            return b""
         try:
-            return self._line.recv(4096)
+            if self.fault is None or self._peer.reads:
+                return self._line.recv(4096)
+            assert isinstance(self._line, socket.socket)
+            heard = self._line.recv(BACKLOG_MAX, socket.MSG_PEEK)[self._n_seen :]
+            self._n_seen += len(heard)
+            return heard
         except BlockingIOError:
             return b""
         except OSError:
             # of a pseudo-terminal that nobody has open, or a host that has gone
             return b""
-
-    def _hear_the_rest(self) -> None:
-        """What was never read had its effect when it came."""
-        if self._line is None or not self._pending:
-            return
-        rest = b""
-        with contextlib.suppress(OSError):
-            while data := self._line.recv(4096):
-                rest += data
-        for now, n_pending in self._pending:
-            self._body.now = now
-            self._robot.feed(rest[self._n_heard : n_pending], now)
-            self._robot.output(now)
-            self._n_heard = max(self._n_heard, n_pending)
 
     def _say(self) -> None:
         if not self._backlog or self._line is None:

@@ -54,9 +54,15 @@ def answer(question: str) -> str:
         OutputLost: if the question cannot be printed.
     """
     say(question, end="")
-    if sys.stdin is None:
+    # without `input`, which needs standard error, too
+    line = sys.stdin.buffer.readline(ANSWER_MAX) if sys.stdin else b""
+    if not line:
         raise EOFError
-    return input()
+    return line.decode(errors="replace").strip()
+
+
+ANSWER_MAX = 1000
+"""Most bytes of an answer; what is behind them is the next one."""
 
 
 def calibrate(argv: Sequence[str], ask: Callable[[str], str] = answer) -> int:

@@ -48,12 +48,14 @@ def measure_gap(argv: Sequence[str]) -> int:
     check_threads(options.threads)
     policies = policies_of(dict.fromkeys(options.paths))
     robots = [options.robot] if options.robot else [PLANAR_ROBOT, WHEELED_ROBOT]
+    # slow to import
+    from evolution.gap.gap_folder import write_gap
+    from evolution.gap.outcomes import check_homes
+
+    check_homes(policies, robots)
     with writing():
         options.output.mkdir(parents=True, exist_ok=True)
     check_writable(options.output / "gap.md")
-    # slow to import
-    from evolution.gap.gap_folder import write_gap
-
     write_gap(
         options.output,
         policies,

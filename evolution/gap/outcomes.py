@@ -30,6 +30,18 @@ class Outcome:
     crash_rate: float
 
 
+def check_homes(policies: Sequence[NamedPolicy], robots: Sequence[str]) -> None:
+    """Refuse robots and arenas that cannot be used, before the work is done.
+
+    Raises:
+        UserError: for such a robot or arena.
+    """
+    for robot in robots:
+        for policy in policies:
+            scene = load_scene(robot, policy.arena, policy.task.control_step)
+            FreeSpace(scene, policy.start_clearance)
+
+
 def ideal(
     policies: Sequence[NamedPolicy],
     robot: str,

@@ -21,6 +21,7 @@ from epuck_mj.host.interruption import Interrupted, Interruption
 from epuck_mj.host.limits import check_flag
 from epuck_mj.host.yaml_and_json import read_json
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
+from epuck_mj.scene.model_files import find_arena, find_robot
 from evolution.judging.scores import KnownScores, read_champion
 from evolution.run.directory import RunDirectory
 from evolution.run.lock import locked
@@ -95,8 +96,10 @@ def study(argv: Sequence[str]) -> int:
     if options.experiments is not None:
         names = [name.strip() for name in options.experiments.split(",")]
         config = config.only(names)
-    if options.cluster is None:
-        for each in config.experiments.values():
+    for each in config.experiments.values():
+        find_robot(each.robot)
+        find_arena(each.arena)
+        if options.cluster is None:
             check_needs(each)
     directory = StudyDirectory(options.output)
     directory.open(config, seeds)
