@@ -110,6 +110,17 @@ def test_robots_stand_on_the_floor_that_is_there(tmp_path, robot, height):
         np.testing.assert_allclose(driven(robot, arena)[:15], expected[:15], atol=0.003)
 
 
+def test_what_is_for_show_stays_for_rays(tmp_path):
+    path = tmp_path / "arena.xml"
+    show = '<geom name="paper" size=".02" contype="0" conaffinity="0"/>'
+    body = f'<body pos="0 0 .03"><body>{show}</body></body></worldbody>'
+    head = '<compiler discardvisual="true" fusestatic="false"/>'
+    path.write_text(with_head(head).replace("</worldbody>", body))
+    scene = load_scene("epuck", str(path))
+    assert scene.model.geom("paper").bodyid == 0
+    assert scene.model.body("epuck/epuck").id > 0
+
+
 def test_a_low_wall_is_no_floor(tmp_path):
     path = tmp_path / "arena.xml"
     path.write_text(re.sub("0.03", "0.015", re.sub(".*floor.*", "", PLAIN)))

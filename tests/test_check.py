@@ -170,6 +170,13 @@ ERRORS = {
         ),
         "robots do not stay where they are put",
     ),
+    "toy that no physics can hold": (
+        with_more(
+            '<body name="toy" pos="0 0 .2"><joint type="slide" stiffness="1e7" '
+            'springref=".01"/><geom size=".01" mass=".001"/></body>'
+        ),
+        "error: what moves, body 'toy', cannot be simulated with a step of 0.01 s, ",
+    ),
     "cloth": (
         with_more(
             '<flexcomp name="cloth" type="grid" count="3 3 1" spacing=".05 .05 .05" '

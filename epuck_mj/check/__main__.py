@@ -4,6 +4,7 @@ Exit status 0 if the arena is usable, 1 if errors were found in it, and 2, as fo
 command lines here, if there is no arena to look at: bad options, no file, no text.
 """
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,7 +44,8 @@ def check(argv: Sequence[str]) -> int:
     from epuck_mj.check.arena import check_arena
 
     shipped = [Path(name).stem for name in SHIPPED_ROBOTS]
-    checked = check_arena(options.arena, [options.robot] if options.robot else shipped)
+    robots = [options.robot] if options.robot else shipped
+    checked = check_arena(options.arena, robots, _tell)
     for line in report.lines(checked.arena, checked.findings):
         print(line)
     if options.picture and checked.scene and checked.grid:
@@ -56,6 +58,12 @@ def check(argv: Sequence[str]) -> int:
     elif options.picture:
         print("no picture: there are no walls to draw")
     return 0 if report.usable(checked.findings) else 1
+
+
+def _tell(doing: str) -> None:
+    """Tell somebody who waits what is being done."""
+    if sys.stderr.isatty():
+        print(doing, file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

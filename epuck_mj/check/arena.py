@@ -4,7 +4,7 @@ Each part examines a scene and returns findings. Only `report` makes text of the
 only `__main__` prints.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -68,12 +68,15 @@ class Report:
     grid: Grid | None
 
 
-def check_arena(arena: str, robots: Sequence[str]) -> Report:
+def check_arena(
+    arena: str, robots: Sequence[str], tell: Callable[[str], object] = lambda _: None
+) -> Report:
     """Check an arena with each robot.
 
     Args:
         arena: name of a shipped arena, or path of an MJCF.
         robots: names of shipped robots, or paths of MJCF files.
+        tell: what is told what is being done: large arenas take half a minute.
 
     Raises:
         UserError: if the arena cannot be read, or a robot cannot be used at all.
@@ -83,6 +86,7 @@ def check_arena(arena: str, robots: Sequence[str]) -> Report:
     for robot in robots:
         # in an arena that is sound, what is wrong is the robot
         load_scene(robot, "arena")
+        tell(f"Checking {path.name} with {Path(robot).stem} ...")
         checks.append(_check(path, robot, seen))
     # what was found with each robot is one finding
     findings = dict.fromkeys(found for check in checks for found in check.findings)
@@ -165,8 +169,8 @@ def _settings(files: SourceFiles) -> list[Finding]:
 
 def _about(problem: UserError, arena: Path) -> Finding:
     """An error about an arena as a whole, whose path stands before it anyway."""
-    text = str(problem).replace(f"arena '{arena}' ", "the arena ")
-    text = text.removeprefix(f"arena '{arena}': ")
+    text = str(problem).removeprefix(f"arena '{arena}': ")
+    text = text.replace(f"arena '{arena}'", "the arena")
     return error(TOPIC, text.replace(f" '{arena}'", " it"), Place(arena))
 
 

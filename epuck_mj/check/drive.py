@@ -4,7 +4,6 @@ import numpy as np
 
 from epuck_mj.check.findings import Finding, Place, error, info
 from epuck_mj.constants import SPEED_MAX, WHEEL_RADIUS
-from epuck_mj.errors import UserError
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene, load_scene
@@ -39,13 +38,13 @@ def drive_findings(
         starts: from which the one with the longest way is taken, `(n, 3)`.
         topic: heading of the findings.
         place: what an error is about.
+
+    Raises:
+        UserError: if MuJoCo warns of a simulation that means nothing.
     """
     start, length = _longest_way(scene, starts)
     plain = load_scene(str(scene.robot), PLAIN)
-    try:
-        here, crashed = _driven(scene, start, length)
-    except UserError as problem:
-        return [error(topic, str(problem), place)]
+    here, crashed = _driven(scene, start, length)
     there, _ = _driven(plain, np.array([-LENGTH_MAX / 2, 0, 0]), length)
     off = np.abs(here - there).max(axis=0)
     moved, turned = off[:2].max(), off[2]

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from epuck_mj.constants import PROXIMITY_RANGE
-from epuck_mj.scene.geometry import box_around, kinematics
+from epuck_mj.scene.geometry import box_around, boxes, kinematics
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.robot_parts import SHELL
 
@@ -31,12 +31,16 @@ def heights_of(scene: Scene) -> Heights:
     return Heights((box[0][2], box[1][2]), (float(low), float(high)))
 
 
+def extents(model: mujoco.MjModel) -> np.ndarray:
+    """Lowest and highest point of each geom [m], `(ngeom, 2)`; of planes, no end."""
+    low, high = boxes(model, np.arange(model.ngeom))
+    return np.stack([low[:, 2], high[:, 2]], axis=1)
+
+
 def extent(model: mujoco.MjModel, geom: int) -> tuple[float, float]:
     """Lowest and highest point of a geom [m]; of a plane, no end."""
-    box = box_around(model, np.arange(model.ngeom) == geom)
-    if box is None:
-        return -np.inf, np.inf
-    return float(box[0][2]), float(box[1][2])
+    low, high = extents(model)[geom].tolist()
+    return low, high
 
 
 def mm(height: float) -> str:

@@ -7,9 +7,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from epuck_mj.scene.geometry import seen_by_rays
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.outline import geom_outlines, shell_outline, wall_outlines
-from epuck_mj.scene.robot_parts import of_robot, static
+from epuck_mj.scene.robot_parts import SHELL, can_touch, of_robot, static
 from epuck_mj.scene.starts import Grid
 from epuck_mj.show.colors import GREEN, ORANGE, fraction
 
@@ -64,8 +65,10 @@ def region_figure(scene: Scene, grid: Grid, title: str) -> Figure:
         outline = {"mfc": "none", "mec": "black", "ms": 9}
         size = Line2D([], [], ls="", marker="o", label="robot's size", **outline)
         legend.append(size)
+    # four in a line are wider than the figure
+    columns = 2 if len(legend) > 3 else len(legend)
     figure.legend(
-        handles=legend, loc="outside lower center", ncols=len(legend), frameon=False
+        handles=legend, loc="outside lower center", ncols=columns, frameon=False
     )
     axes.set(title=title, xlabel="x [m]", ylabel="y [m]", aspect="equal")
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -73,5 +76,7 @@ def region_figure(scene: Scene, grid: Grid, title: str) -> Figure:
 
 
 def _moving(scene: Scene) -> np.ndarray:
-    """Which geoms of the arena move, `(ngeom,)`."""
-    return ~static(scene.model) & ~of_robot(scene.model)
+    """Which geoms of the arena move and can be hit or seen, `(ngeom,)`."""
+    model = scene.model
+    meets = can_touch(model, model.geom(SHELL).id) | seen_by_rays(model)
+    return meets & ~static(model) & ~of_robot(model)

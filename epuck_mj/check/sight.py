@@ -150,7 +150,25 @@ def _where(poses: np.ndarray) -> str:
 def _meetings(scene: Scene, grid: Grid, geoms: np.ndarray, height: float) -> Meetings:
     """Meetings with the geoms of a mask, where the robot has room to stand."""
     index, poses = _approaches(scene, grid, geoms)
+    # what is near is measured together
+    order = np.lexsort(np.floor(poses[:, :2] / NEARBY).T)
     probe = ClearanceProbe(scene, 1)
+    parts = [
+        _meet(scene, probe, index[some], poses[some], height)
+        for some in np.array_split(order, len(order) // CHUNK + 1)
+    ]
+    together = zip(*(vars(part).values() for part in parts), strict=True)
+    return Meetings(*(np.concatenate(values) for values in together))
+
+
+def _meet(
+    scene: Scene,
+    probe: ClearanceProbe,
+    index: np.ndarray,
+    poses: np.ndarray,
+    height: float,
+) -> Meetings:
+    """Meetings of robots on poses `(n, 3)` with the geoms `(n,)` they head at."""
     stands = probe.measure(poses).distance >= -TOUCH
     index, poses = index[stands], poses[stands]
     heading = np.stack(
@@ -272,6 +290,9 @@ def _ahead(scene: Scene, poses: np.ndarray) -> np.ndarray:
         ahead[first : first + CHUNK] = seen
     return ahead
 
+
+NEARBY = 0.8
+"""Side of the squares by which poses are sorted [m]."""
 
 CHUNK = 1024
 """Number of poses measured at once: bounds memory, changes no result."""

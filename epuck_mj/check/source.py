@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import mujoco
 
 from epuck_mj.check.findings import Finding, Place, Unusable, error, names
-from epuck_mj.scene.mjcf import WHOLE_MODEL
+from epuck_mj.scene.mjcf import make_whole
 from epuck_mj.scene.source_files import SourceFiles, named_files, source_files
 from epuck_mj.scene.xml_elements import ELEMENTS_MAX, BadXml, Element
 
@@ -74,8 +74,7 @@ def places_of(files: SourceFiles) -> Places:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             spec = mujoco.MjSpec.from_string(_one_text(files))
-            for name, value in WHOLE_MODEL.items():
-                setattr(spec.compiler, name, value)
+            make_whole(spec)
             spec.compile()
     except REFUSALS as problem:
         message = " ".join(str(problem).split())

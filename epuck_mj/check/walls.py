@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from epuck_mj.check.findings import Finding, Place, error, info, names, warning
-from epuck_mj.check.heights import Heights, extent, mm
+from epuck_mj.check.heights import Heights, extent, extents, mm
 from epuck_mj.check.source import Places
 from epuck_mj.scene.clearance import MEASURED
 from epuck_mj.scene.floor import floors
@@ -75,8 +75,14 @@ def wall_findings(
     """Findings about the geoms of an arena."""
     model = scene.model
     findings = _found(model)
+    low, high = extents(model).T
+    hidden = walls(model) & ((high <= heights.shell[0]) | (low >= heights.shell[1]))
     for geom in np.flatnonzero(walls(model)).tolist():
-        findings += _wall(scene, grid, geom, places.geom(geom), heights)
+        place = places.geom(geom)
+        if hidden[geom]:
+            findings += _hidden(scene, grid, geom, place, heights)
+        else:
+            findings += _mesh(model, geom, place)
     return findings
 
 
@@ -103,12 +109,12 @@ def untouched_findings(
     """Warnings of what stands where a shell is, but cannot be hit by it."""
     others = static(model) & ~of_robot(model) & ~walls(model)
     others &= model.geom_type != _SHAPE.mjGEOM_PLANE
-    findings = []
-    for geom in np.flatnonzero(others & seen_by_rays(model)).tolist():
-        low, high = extent(model, geom)
-        if high > heights.shell[0] and low < heights.shell[1]:
-            findings.append(warning(TOPIC, no_wall(model, geom), places.geom(geom)))
-    return findings
+    low, high = extents(model).T
+    others &= (high > heights.shell[0]) & (low < heights.shell[1])
+    return [
+        warning(TOPIC, no_wall(model, geom), places.geom(geom))
+        for geom in np.flatnonzero(others & seen_by_rays(model)).tolist()
+    ]
 
 
 def no_wall(model: mujoco.MjModel, geom: int) -> str:
@@ -146,10 +152,10 @@ def _found(model: mujoco.MjModel) -> list[Finding]:
     ]
 
 
-def _wall(
+def _hidden(
     scene: Scene, grid: Grid, geom: int, place: Place, heights: Heights
 ) -> list[Finding]:
-    """Finding about a geom that the shell can hit, if robots do not meet it."""
+    """Finding about a wall above or below robots, if they do not meet it."""
     low, high = extent(scene.model, geom)
     if high <= heights.shell[0]:
         if high > heights.shell[0] - START_CLEARANCE:
@@ -158,11 +164,9 @@ def _wall(
             text += f'{at}contype="0" conaffinity="0" of what robots drive over'
             return [error(TOPIC, text, place)]
         below = f"the robot passes above it: it ends at {mm(high)}"
-    elif low >= heights.shell[1]:
+    else:
         below = f"the robot passes below it: it begins at {mm(low)}"
         below += f", the shell ends at {mm(heights.shell[1])}"
-    else:
-        return _mesh(scene.model, geom, place)
     (outline,) = geom_outlines(scene, np.arange(scene.model.ngeom) == geom)
     meets = within(outline, grid.nodes[grid.inside]).any()
     return [warning(TOPIC, below, place)] if meets else []

@@ -30,7 +30,7 @@ They bound memory and change no result.
 WALLS_MAX = 30
 """Most walls that are all measured for every pose; of more, those near it."""
 
-SQUARES = ((0.4, 0.06), (0.8, CLEARANCE_MAX))
+SQUARES = ((0.1, 0.04), (0.8, CLEARANCE_MAX))
 """Squares whose poses are measured with the same walls: their sides, and how far from
 a shell walls are looked for [m]. The second are for poses beside which the first found
 none."""

@@ -23,6 +23,9 @@ TOLERANCE = 1e-9
 ITERATIONS = 200
 """Most iterations of MuJoCo's distances; most shapes need ten."""
 
+MEMORY = 1_000_000
+"""Memory of a model of walls and shell [bytes]."""
+
 _SHAPE, _SENSOR, _OBJECT = mujoco.mjtGeom, mujoco.mjtSensor, mujoco.mjtObj
 
 _ROBOT = "robot"
@@ -88,6 +91,8 @@ def _walls_and_shell(
     They give the least distance, and its two points: the shell's, then the wall's.
     """
     spec = mujoco.MjSpec()
+    # MuJoCo's own choice is ten times what distances need
+    spec.memory = MEMORY
     spec.option.ccd_tolerance, spec.option.ccd_iterations = TOLERANCE, ITERATIONS
     for geom in some:
         _copy(spec, spec.worldbody, model, data, geom)
