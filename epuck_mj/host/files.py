@@ -5,6 +5,7 @@ import io
 import os
 import secrets
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -195,6 +196,7 @@ DAMAGED = (
     OSError,
     RuntimeError,
     zipfile.BadZipFile,
+    zlib.error,
     TokenError,
 )
 """Exceptions that numpy and zipfile raise for damaged archives."""

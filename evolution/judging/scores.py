@@ -7,7 +7,7 @@ known scores as plain values.
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, Field, StrictFloat, StrictInt, ValidationError
 
@@ -15,6 +15,12 @@ from epuck_mj.errors import UserError
 from epuck_mj.policies.file import ControllerFile, load_controller
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.step.fitness import of_most
+
+Number = Annotated[StrictFloat, Field(ge=-1e12, le=1e12)]
+"""A score; what is larger was written by nobody who tests robots."""
+
+Share = Annotated[StrictFloat, Field(ge=0, le=1)]
+"""A share of trials."""
 
 
 class _Record(BaseModel, frozen=True, allow_inf_nan=False):
@@ -57,15 +63,15 @@ class HeldOut(_Record, frozen=True):
             it, None if none has.
     """
 
-    mean: StrictFloat
-    standard_deviation: StrictFloat = math.nan
-    interval: tuple[StrictFloat, StrictFloat] = (math.nan, math.nan)
-    worst: StrictFloat = math.nan
-    crash_rate: StrictFloat
-    collisions_per_minute: StrictFloat = math.nan
+    mean: Number
+    standard_deviation: Number = math.nan
+    interval: tuple[Number, Number] = (math.nan, math.nan)
+    worst: Number = math.nan
+    crash_rate: Share
+    collisions_per_minute: Number = math.nan
     starts: StrictInt = Field(ge=2)
-    behaviour: Mapping[str, StrictFloat] = {}
-    metrics: Mapping[str, StrictFloat | None] = {}
+    behaviour: Mapping[str, Share] = {}
+    metrics: Mapping[str, Number | None] = {}
 
     @property
     def following(self) -> float:
@@ -97,8 +103,8 @@ class Believed(_Record, frozen=True):
         held_out: its mean on the test starts, on ideal robots.
     """
 
-    stored: StrictFloat
-    held_out: StrictFloat
+    stored: Number
+    held_out: Number
 
 
 class Scores(_Record, frozen=True):
@@ -112,8 +118,8 @@ class Scores(_Record, frozen=True):
         held_out_as_evolved: tests with the disturbances it evolved with, by robot.
     """
 
-    stored: StrictFloat
-    validation: StrictFloat = math.nan
+    stored: Number
+    validation: Number = math.nan
     held_out: Mapping[str, HeldOut] = Field(min_length=1)
     most_believed: Believed | None = None
     held_out_as_evolved: Mapping[str, HeldOut] = {}
@@ -174,7 +180,7 @@ def read_champion(path: Path) -> tuple[ControllerFile, Scores]:
 class KnownScores(Scores, frozen=True):
     """Scores of any policy, of which each may be unknown."""
 
-    stored: StrictFloat = math.nan
+    stored: Number = math.nan
     held_out: Mapping[str, HeldOut] = {}
 
     @classmethod
