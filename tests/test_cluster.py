@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -28,7 +28,7 @@ from evolution.study.__main__ import study
 from evolution.study.cluster import carry_out_on_cluster, connection, requirements
 from evolution.study.jobs import Event, Job, carry_out, generations
 from tests.no_pictures import INSTEAD, draw_nothing
-from tests.processes import PATIENCE
+from tests.processes import PATIENCE, python_process
 
 pytestmark = pytest.mark.slow
 
@@ -505,3 +505,46 @@ def test_ctrl_c_ends_workers_of_its_own(preload, tmp_path):
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_a_worker_and_then_the_scheduler_of_a_study_are_killed(
+    preload, references, tmp_path
+):
+    """The first is replaced; the other is the study, whose next call goes on."""
+    (tmp_path / "mine.yaml").write_text(config("ga", 1, **LONG).to_yaml())
+    (tmp_path / "tiny.yaml").write_text(yaml.safe_dump({"experiments": ["mine.yaml"]}))
+    argv = ["tiny.yaml", "--seeds", "1-2", "--output", "out", "--cluster", "local:2"]
+    settings = {
+        "DASK_DISTRIBUTED__WORKER__PRELOAD": repr([str(preload)]),
+        "DASK_TEMPORARY_DIRECTORY": str(tmp_path),
+    }
+    options = {"cwd": tmp_path, "env": os.environ | settings}
+    command = ("-m", "evolution.study", *argv)
+    with python_process(*command, **options) as process:
+        wait_until(lambda: any(tmp_path.rglob("checkpoint.npz")))
+        first, _ = before = workers_of(process.pid)
+        os.kill(first, signal.SIGKILL)
+        wait_until(lambda: len(set(workers_of(process.pid)) - set(before)) == 1)
+        process.kill()
+        process.communicate(timeout=PATIENCE)
+    with python_process(*command, **options) as process:
+        stdout, stderr = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, stderr) == (0, "")
+    assert "2 of 2 runs are finished" in stdout
+    for seed in (1, 2):
+        folder = tmp_path / "out" / "mine" / f"seed-{seed}"
+        job = Job("mine", config("ga", seed, **LONG), folder, tuple(argv))
+        assert_as_here(job, references)
+
+
+def workers_of(pid: int) -> list[int]:
+    """Process ids of a local cluster's workers, which its process has started."""
+    threads = Path(f"/proc/{pid}/task").iterdir()
+    children = " ".join((thread / "children").read_text() for thread in threads)
+    found = []
+    for child in children.split():
+        with suppress(OSError):
+            if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
+                found.append(int(child))
+    return found

@@ -32,6 +32,7 @@ from evolution.judging.scores import Scores
 from evolution.run import __main__ as run_command
 from evolution.run import execution
 from evolution.run.__main__ import evolve
+from evolution.run.directory import RunDirectory
 from evolution.run.history import HISTORY, Record
 from evolution.run.lock import LOCK
 from evolution.run.progress import Progress
@@ -62,6 +63,7 @@ PROMISED = {
     "champion.rrd",
 }
 THERE = PROMISED | {LOCK}
+DRAWN = {"fitness.png", "trajectory.npz", "trajectory.png", "champion.rrd"}
 REPRODUCED = ("history.csv", "champion.json")
 
 
@@ -412,6 +414,68 @@ def test_resume_of_a_finished_run_changes_nothing(finished, here, capsys):
     assert evolve(["--resume", str(finished[0])]) == 0
     assert "is finished; Replay: " in capsys.readouterr().out
     assert tree(finished[0]) == before
+
+
+LOSSES = {
+    **{name: lambda path: path.unlink() for name in sorted(PROMISED - DRAWN)},
+    "champion.json cut": lambda path: path.write_bytes(path.read_bytes()[:500]),
+    "champion.json text": lambda path: path.write_text("not mine"),
+    "history.csv empty": lambda path: path.write_bytes(b""),
+    "best_individuals.npz cut": lambda path: path.write_bytes(path.read_bytes()[:99]),
+}
+# without it nothing can be written again, and without this nothing is known to be done
+del LOSSES["checkpoint.npz"], LOSSES["provenance.json"]
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+def test_what_a_finished_run_has_lost_is_written_again(
+    loss, finished, here, no_pictures, capsys
+):
+    shutil.copytree(finished[0], here / "run")
+    name = loss.split()[0]
+    LOSSES[loss](here / "run" / name)
+    assert evolve(["--resume", "run"]) == 0
+    out, error = capsys.readouterr()
+    assert "written again: " in error
+    assert name in error
+    assert "is finished" not in out
+    for each in ("config.yaml", *REPRODUCED, "best_individuals.npz"):
+        assert (here / "run" / each).read_bytes() == (finished[0] / each).read_bytes()
+    # how long the generations took cannot be known again
+    timing = [(path / "timing.csv").read_text() for path in (here / "run", finished[0])]
+    untimed = [re.sub(r"(?m)^(\d+),[\d.]*,", r"\1,,", text) for text in timing]
+    assert untimed[0] == untimed[1]
+    assert RunDirectory(here / "run").finished
+    assert evolve(["--resume", "run"]) == 0
+    assert "run is finished; Replay: " in capsys.readouterr().out
+
+
+def test_lost_pictures_are_drawn_again(finished, here):
+    shutil.copytree(finished[0], here / "run")
+    for name in DRAWN:
+        (here / "run" / name).unlink()
+    assert not RunDirectory(here / "run").finished
+    assert evolve(["--resume", "run"]) == 0
+    assert RunDirectory(here / "run").finished
+    for name in DRAWN - {"champion.rrd"}:
+        again, before = (path / name for path in (here / "run", finished[0]))
+        assert again.read_bytes() == before.read_bytes(), name
+
+
+def test_a_copy_without_checkpoint_is_finished_but_cannot_be_mended(
+    finished, here, refusal, capfd
+):
+    run = RunDirectory(here / "run")
+    run.path.mkdir()
+    for path in RunDirectory(finished[0]).kept:
+        shutil.copy(path, run.path)
+    assert evolve(["--resume", "run"]) == 0
+    assert "run is finished" in capfd.readouterr().out
+    run.champion.unlink()
+    assert not run.finished
+    # it would begin again, and overwrite the histories
+    message = refusal("--resume", "run")
+    assert message.startswith("cannot resume 'run': without 'checkpoint.npz' the run ")
 
 
 def test_a_run_on_an_own_robot_of_another_name(here, no_pictures, capsys):

@@ -28,6 +28,8 @@ from evolution.settings.config_files import load_config
 from evolution.study import __main__ as module
 from evolution.study import jobs
 from evolution.study.__main__ import study
+from evolution.study.config import StudyConfig
+from evolution.study.directory import StudyDirectory
 from evolution.study.jobs import Event, Job, carry_out, failure_log, failure_of
 from tests.no_pictures import INSTEAD, draw_nothing
 from tests.processes import PATIENCE, python_process
@@ -305,6 +307,60 @@ def test_what_is_not_done_is(finished, carried, capsys):
         "5/6 one seed 3",
         "6/6 two seed 3",
     ]
+
+
+@pytest.mark.parametrize("damage", ["lost", "cut", "picture"])
+def test_a_run_that_has_lost_something_is_completed(damage, finished, carried):
+    path = finished / "two" / "seed-1" / "champion.json"
+    expected = path.read_bytes()
+    if damage == "lost":
+        path.unlink()
+    elif damage == "cut":
+        path.write_bytes(expected[:100])
+    else:
+        path.with_name("trajectory.png").unlink()
+    argv = ["mine.yaml", "--seeds", "1-2", "--output", "out"]
+    assert study(argv) == 0
+    assert list(map(str, carried.jobs)) == ["two seed 1"]
+    assert path.read_bytes() == expected
+    assert study(argv) == 0
+    assert len(carried.jobs) == 1
+
+
+@pytest.mark.parametrize("name", ["config.yaml", "provenance.json", "checkpoint.npz"])
+def test_a_damaged_run_does_not_stop_the_others(name, finished, carried, monkeypatch):
+    """It fails with a line, as long as it is not finished without that file."""
+    (finished / "two" / "seed-1" / name).write_text("[")
+    (finished / "two" / "seed-1" / "champion.json").unlink()
+    events: list[Event] = []
+
+    def carry_all_out(jobs, means, n_processes):
+        for job in jobs:
+            try:
+                carry_out(job, means, lambda _: None)
+            except UserError as error:
+                events.append(Event(job, ended=True, failure=failure_of(job, error)))
+                yield events[-1]
+            else:
+                yield Event(job, ended=True)
+
+    monkeypatch.setattr(module, "carry_out_side_by_side", carry_all_out)
+    assert study(["mine.yaml", "--seeds", "1-3", "--output", "out"]) == 1
+    assert [str(event.job) for event in events] == ["two seed 1"]
+    assert name in str(events[0].failure)
+    assert "\n" not in str(events[0].failure)
+    assert RunDirectory(finished / "two" / "seed-3").finished
+
+
+def test_a_lost_or_damaged_yardstick_is_measured_again(here, monkeypatch):
+    config = load_config(here / "one.yaml")
+    directory = StudyDirectory(here / "out")
+    directory.open(StudyConfig({"one": config}), [1])
+    module._measure_yardstick(directory)
+    expected = directory.yardstick.read_bytes()
+    directory.yardstick.write_bytes(expected[:50])
+    module._measure_yardstick(directory)
+    assert directory.yardstick.read_bytes() == expected
 
 
 def test_some_experiments_now_and_the_others_later(here, carried):

@@ -11,9 +11,16 @@ import yaml
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.scene.model_files import MODELS
-from evolution.run.directory import locked
+from evolution.run.lock import locked
 from evolution.settings.config_files import find_config, load_config
-from evolution.study.config import StudyConfig, find_study, parse_seeds
+from evolution.study.config import (
+    SEEDS_MAX,
+    SEEDS_OF_STUDY_MAX,
+    StudyConfig,
+    find_study,
+    parse_seeds,
+)
+from evolution.study.data import load_study
 from evolution.study.directory import StudyDirectory
 from tests.processes import PATIENCE
 from tests.shipped import OPTIMIZERS
@@ -216,6 +223,35 @@ def test_more_experiments_join(here):
     assert both.experiments["de-best"] == load_config(find_config("de-best"))
 
 
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [("steps", (300, 60)), ("robot", ("epuck_planar", "epuck"))],
+)
+def test_experiments_that_no_report_compares_are_refused(key, values, here):
+    """At the start of the study, and by the rule of the report."""
+    for name, value in zip(("a", "b"), values, strict=True):
+        Path(f"{name}.yaml").write_text(f"{key}: {value}\n{GA}")
+    message = (
+        f"experiments of one study have to have the same {key}, "
+        f"got a {values[0]}, b {values[1]}"
+    )
+    assert refused(study, "experiments: [a.yaml, b.yaml]") == message
+    # what all of them share decides
+    study(f"experiments: [a.yaml, b.yaml]\ncommon: {{{key}: {values[0]}}}")
+    # one after the other
+    directory = StudyDirectory(here / "out")
+    directory.open(study("experiments: [a.yaml]"), [1])
+    before = directory.config.read_bytes(), directory.asked.read_bytes()
+    assert refused(directory.open, study("experiments: [b.yaml]"), [1]) == message
+    assert (directory.config.read_bytes(), directory.asked.read_bytes()) == before
+    # and one of an earlier version
+    fields = {
+        name: load_config(Path(f"{name}.yaml")).model_dump() for name in ("a", "b")
+    }
+    directory.config.write_text(yaml.safe_dump(fields))
+    assert message in refused(load_study, directory.path)
+
+
 def test_an_experiment_that_has_changed_does_not(here):
     stored = study("experiments: [de-best, ga]\ncommon: {steps: 5}")
     other = study("experiments: [ga, de-rand]\ncommon: {steps: 6, trials: 2}")
@@ -287,6 +323,24 @@ def test_two_that_open_a_study_at_once_both_have_their_say(here):
             each.result(timeout=PATIENCE)
     assert set(directory.stored_config().experiments) == {"ga", "de-best"}
     assert directory.asked_seeds() == {"ga": [1], "de-best": [2]}
+
+
+def test_more_seeds_than_one_command_takes(here):
+    directory, config = StudyDirectory(here / "out"), study("experiments: [ga]")
+    directory.open(config, range(1, SEEDS_MAX + 1))
+    directory.open(config, [SEEDS_MAX + 1])
+    assert directory.asked_seeds() == {"ga": [*range(1, SEEDS_MAX + 2)]}
+    directory.open(config, [1])
+    # there is an end, on writing as on reading
+    before = directory.asked.read_bytes()
+    many = range(SEEDS_OF_STUDY_MAX + 1)
+    assert refused(directory.open, config, many) == (
+        f"expected at most {SEEDS_OF_STUDY_MAX} seeds in '{directory.path}', got "
+        f"{SEEDS_OF_STUDY_MAX + 1} of ga"
+    )
+    assert directory.asked.read_bytes() == before
+    directory.asked.write_text(f"ga: 0-{SEEDS_OF_STUDY_MAX}\n")
+    assert "seeds.yaml': expected at most" in refused(directory.asked_seeds)
 
 
 def test_an_older_study_was_asked_for_what_it_has(here):

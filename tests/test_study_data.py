@@ -1,14 +1,20 @@
 """What a study has found, read back: damage is named, and never a traceback."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from epuck_mj.errors import UserError
+from evolution.pages.blocks import to_html
+from evolution.report.page import report_blocks
+from evolution.report.run_table import run_rows
 from evolution.report.sections.how_to_get_every_number_again import origins
-from evolution.study.data import load_study, read_history
+from evolution.reproduce.reproduction import reproduction
+from evolution.run.history import read_history
+from evolution.study.data import load_study
 from tests.study_on_disk import write_study
 
 
@@ -65,13 +71,69 @@ def test_a_damaged_yardstick_is_missing_and_the_runs_are_there(path, text):
 
 @pytest.mark.parametrize(
     "change",
-    [{"git": "text"}, {"versions": [1]}, {"processor": 3}, {"argv": [1]}],
+    [
+        {"git": "text"},
+        {"versions": [1]},
+        {"processor": 3},
+        {"processor": {"flags": 5}},
+        {"argv": [1]},
+        {"resumed": [{"git": 3}]},
+    ],
     ids=str,
 )
-def test_edited_provenance_is_left_out(path, change):
+def test_edited_provenance_is_named(path, change):
     file = path / "ga" / "seed-1" / "provenance.json"
     edit(file, lambda fields: fields.update(change))
-    assert origins(load_study(path))["git"]
+    data = load_study(path)
+    assert origins(data)["git"]
+    line, _ = data.missing
+    assert line.startswith(f"ga seed 1: '{file}' is damaged: {next(iter(change))}")
+
+
+CONTENTS: dict[str, Callable[[bytes], bytes]] = {
+    "emptied": lambda _: b"",
+    "cut": lambda content: content[: len(content) // 2],
+    "text": lambda _: b"hello\n",
+    "bytes": lambda _: bytes(range(256)) * 20,
+    "lines": lambda content: content.replace(b"\n", b"\r"),
+    "a long line": lambda _: b"1," * 200_000,
+    "deep": lambda _: b"[" * 100_000,
+    "texts": lambda content: re.sub(rb"(?<=[ ,])([-\d.]+)(?=[,\n])", rb'"\1"', content),
+}
+
+
+@pytest.mark.parametrize("damage", [*CONTENTS, "missing", "a folder"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "config.yaml",
+        "provenance.json",
+        "champion.json",
+        "history.csv",
+        "best_individuals.npz",
+        "timing.csv",
+    ],
+)
+def test_one_damaged_file_takes_no_report_down(name, damage, path):
+    """The run is named and left out, or it can be reported without the file."""
+    file = path / "ga" / "seed-1" / name
+    content = file.read_bytes()
+    file.unlink()
+    if damage == "a folder":
+        file.mkdir()
+    elif damage != "missing":
+        file.write_bytes(CONTENTS[damage](content))
+    data = load_study(path)
+    assert [run.seed for run in data.runs["de-best"]] == [1, 2]
+    assert run_rows(data)
+    assert to_html("", report_blocks(data, {}, "out", False))
+    assert reproduction(data, None, [], "")
+    named = [line for line in data.missing if line.startswith("ga seed 1: ")]
+    assert not any("\n" in line for line in named)
+    there = 1 in [run.seed for run in data.runs["ga"]]
+    # only times and counted steps are of no consequence
+    assert len(named) == (not there)
+    assert not there or name == "timing.csv" or damage in ("lines", "texts", "cut")
 
 
 def test_seeds_that_were_asked_for_are_missed(path):

@@ -4,6 +4,7 @@ import contextlib
 import io
 import re
 import shlex
+import signal
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -19,7 +20,7 @@ from epuck_mj.host.hardship import (
     hardship,
     standard_streams,
 )
-from epuck_mj.host.interruption import follows
+from epuck_mj.host.interruption import follows, not_dropped, send_soon
 from epuck_mj.host.limits import check_flag
 from epuck_mj.host.output import OUTPUT_LOST, OutputLost
 
@@ -163,7 +164,8 @@ def _status(run: Callable[[Sequence[str]], int]) -> int | str | None:
     """The exit status of a command line whose output has left the process."""
     standard_streams()
     try:
-        status = run(sys.argv[1:])
+        with not_dropped(KeyboardInterrupt, lambda: send_soon(signal.SIGINT)):
+            status = run(sys.argv[1:])
     except SystemExit as end:
         # after help
         status = end.code

@@ -6,7 +6,9 @@ remembered.
 """
 
 import signal
-from collections.abc import Iterator
+import sys
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Self
 
@@ -68,7 +70,8 @@ class Interruption:
             self._raises = True
             if self.signum is not None:
                 raise Interrupted
-            yield
+            with not_dropped(Interrupted, self._raise_again):
+                yield
         except Exception as error:
             # whatever was interrupted may have failed to clear up
             if follows(error, Interrupted):
@@ -77,12 +80,61 @@ class Interruption:
         finally:
             self._raises = False
 
+    def _raise_again(self) -> None:
+        self._raises = True
+        send_soon(self.signum or signal.SIGINT)
+
     def _handle(self, signum: int, frame: object) -> None:
         if self.signum is None:
             self.signum = signal.Signals(signum)
         if self._raises:
             self._raises = False
             raise Interrupted
+
+
+@contextmanager
+def not_dropped(
+    kind: type[BaseException], again: Callable[[], object]
+) -> Iterator[None]:
+    """Have a signal's exception raised again if Python drops it in the block.
+
+    A signal may come while a finaliser runs, out of which nothing can be raised: Python
+    prints the exception and goes on.
+
+    Args:
+        kind: of the exception.
+        again: called for a dropped one, to have the signal come again.
+    """
+    before = sys.unraisablehook
+
+    def hook(unraisable: "sys.UnraisableHookArgs") -> None:
+        if isinstance(unraisable.exc_value, kind):
+            again()
+        else:
+            before(unraisable)
+
+    sys.unraisablehook = hook
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
+
+
+SOON = 0.01
+"""Time in which a finaliser ends [s]."""
+
+
+def send_soon(signum: signal.Signals) -> None:
+    """Send a signal to this process in a moment."""
+    threading.Timer(SOON, _send, [signum]).start()
+
+
+def _send(signum: signal.Signals) -> None:
+    # to the thread that handles it, which may be waiting
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, signum)
+    else:
+        signal.raise_signal(signum)
 
 
 def follows(error: BaseException, kind: type[BaseException]) -> bool:

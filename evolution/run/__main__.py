@@ -114,9 +114,9 @@ def _run(
     run = Run(options.config, directory, means, argv)
     with directory.locked():
         if resumed:
+            differing = run.resume()
             if lost:
                 print(f"written again: {'; '.join(lost)}", file=sys.stderr)
-            differing = run.resume()
             if differing:
                 print(
                     f"warning: {', '.join(differing)} differ from those at the start "
