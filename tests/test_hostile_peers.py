@@ -86,7 +86,12 @@ def complaints(
             if link in peer.links and name not in but and peer.floods == floods
         ]
         with ThreadPoolExecutor(at_once) as pool:
-            found += pool.map(lambda name: complaint(name, link, folder, drives), names)
+            said = list(
+                pool.map(lambda name: complaint(name, link, folder, drives), names)
+            )
+        # once more, alone: a busy machine looks like a slow bridge
+        suspects = [name for name, text in zip(names, said, strict=True) if text]
+        found += [complaint(name, link, folder, drives) for name in suspects]
     return [text for text in found if text]
 
 
