@@ -15,7 +15,7 @@ from epuck_mj.rungs.watched_robot import WatchedRobot
 from epuck_mj.scene.geometry import walls
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import MODELS
-from epuck_mj.scene.robot_parts import SHELL
+from epuck_mj.scene.robot_parts import PREFIX, SHELL
 from epuck_mj.scene.sameness import check_same
 from epuck_mj.scene.starts import survey
 from epuck_mj.step.control import TaskParameters, drive
@@ -140,8 +140,11 @@ def test_many_at_once_change_nothing_either(tmp_path):
 @pytest.mark.parametrize("field", ["body_mass", "dof_damping", "geom_friction"])
 def test_a_robot_that_is_not_the_same_is_refused(field):
     model = load_scene("epuck", "arena").model
-    alone = mujoco.MjModel.from_xml_path(str(MODELS / "epuck.xml"))
     arena = MODELS / "arena.xml"
+    spec = mujoco.MjSpec.from_file(str(MODELS / "epuck.xml"))
+    for sensor in spec.sensors:
+        sensor.nsample = model.sensor_history[model.sensor(PREFIX + sensor.name).id, 0]
+    alone = spec.compile()
     check_same(model, alone, arena)
     getattr(model, field)[-1] *= 1.1
     getattr(model, field)[-1] += 0.1

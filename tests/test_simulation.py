@@ -9,6 +9,8 @@ from epuck_mj.environments.dm_control import FollowWalls, environment
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
+from epuck_mj.rungs.watched_robot import WatchedRobot
+from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters, run_trials
 from epuck_mj.trials.recorder import record
@@ -132,3 +134,56 @@ def test_memory_stays_flat_over_5000_trials(scene):
         peak.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
     # after the first 1,000 trials have touched all memory, in KiB
     assert peak[-1] - peak[1] < 4096
+
+
+def test_a_touch_in_any_physics_step_is_a_crash(scene):
+    """Against a robot that is looked at after every physics step."""
+    # along a wall, at a shallow angle: some robots touch it and are off it again
+    n = 24
+    clearance = np.linspace(2e-5, 2e-3, n)
+    starts = np.stack(
+        [
+            np.zeros(n),
+            -0.5 + 0.035 + clearance,
+            np.tile([-0.3, 0.0, 0.3, -0.1], n // 4),
+        ],
+        axis=1,
+    )
+    rng = np.random.default_rng(3)
+    commands = rng.uniform(-6, 6, (12, n, 2))
+    batch = MujocoRobots(scene, n, 1)
+    seen = np.array([batch.reset(starts).contact]).repeat(13, axis=0)
+    for k, command in enumerate(commands):
+        seen[k + 1] = batch.step(command).contact
+    brief = 0
+    for i in range(n):
+        robot, touches = WatchedRobot(scene), list[bool]()
+        # what the model says now, without its memory
+        robot.moved = lambda robot=robot, touches=touches: touches.append(
+            bool(scene.reading(robot.data.sensordata).contact)
+        )
+        robot.reset(starts[i : i + 1])
+        assert touches.pop() == seen[0, i]
+        for k, command in enumerate(commands):
+            touches.clear()
+            reading = robot.step(command[i : i + 1])
+            assert len(touches) == scene.n_substeps
+            # the step before's last is the first that is remembered
+            assert any(touches) | (seen[k, i] and seen[k + 1, i]) == seen[k + 1, i]
+            assert bool(reading.contact[0]) == seen[k + 1, i]
+            brief += any(touches) and not touches[-1]
+    assert brief > 0
+
+
+@pytest.mark.parametrize("control_step", [0.05, 0.1, 0.2])
+def test_rays_are_new_whenever_they_are_read(control_step):
+    """Over many control steps: MuJoCo's time is a sum of rounded numbers."""
+    scene = load_scene("epuck", "arena", control_step)
+    starts = FreeSpace(scene, 0.1).sample(np.random.default_rng(5), 1)
+    robot, watched = MujocoRobots(scene, 1, 1), WatchedRobot(scene)
+    robot.reset(starts)
+    watched.reset(starts)
+    for k in range(1500):
+        command = np.array([[3.0, 3.0 + 2 * np.sin(k / 7)]])
+        reading, expected = robot.step(command), watched.step(command)
+        np.testing.assert_array_equal(reading.distance, expected.distance)

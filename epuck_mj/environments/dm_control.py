@@ -97,7 +97,7 @@ def environment(
 ) -> control.Environment:
     """The environment of a task in its scene; a trial is `parameters.steps` long."""
     return control.Environment(
-        mujoco.Physics.from_model(MjModel(scene.model)),
+        mujoco.Physics.from_model(MjModel(scene.sparing())),
         task,
         n_sub_steps=scene.n_substeps,
         # half a step less: a quotient of floats must not add one
@@ -235,7 +235,7 @@ class FollowWalls(base.Task):
         return self._probe.measure(self._pose(physics)).distance
 
     def _reading(self, physics: mujoco.Physics) -> Reading:
-        return self._scene.reading(physics.data.sensordata)
+        return self._scene.reading(physics.data.sensordata, physics.data.history)
 
     def _observe(self, physics: mujoco.Physics) -> np.ndarray:
         return observe(self._reading(physics).distance, self.parameters.sensor_range)

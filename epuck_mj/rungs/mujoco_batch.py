@@ -34,10 +34,11 @@ class MujocoRobots:
         self.capacity = capacity
         # one MjData each, so that sensors refreshed after a step are not
         # computed again at the start of the next
-        self._batch = Batch(scene.model, capacity, threads, persistent=True)
+        self._batch = Batch(scene.sparing(), capacity, threads, persistent=True)
         self._qpos = self._batch.bind("qpos")
         self._ctrl = self._batch.bind("ctrl")
         self._sensordata = self._batch.bind("sensordata")
+        self._history = self._batch.bind("history")
         self._about, self._warned = np.moveaxis(self._batch.warning, -1, 0)
         self._active = np.zeros(0, np.int32)
         self._embodied = False
@@ -114,4 +115,6 @@ class MujocoRobots:
         return ClearanceProbe(self.scene, self._threads)
 
     def _reading(self) -> Reading:
-        return self.scene.reading(self._sensordata[self._active])
+        return self.scene.reading(
+            self._sensordata[self._active], self._history[self._active]
+        )

@@ -86,4 +86,6 @@ class WatchedRobot:
         return ClearanceProbe(self.scene, 1)
 
     def _reading(self) -> Reading:
-        return self.scene.reading(self.data.sensordata[None].copy())
+        return self.scene.reading(
+            self.data.sensordata[None].copy(), self.data.history[None]
+        )

@@ -56,10 +56,15 @@ class Compiled:
     height: float
 
 
-def compiled(arena: Path, robot: Path) -> Compiled:
+def compiled(arena: Path, robot: Path, control_step: float) -> Compiled:
     """A robot in an arena, compiled.
 
     A robot that the arena includes is left out.
+
+    Args:
+        arena: path of the arena's MJCF.
+        robot: path of the robot's MJCF.
+        control_step: how long the robot's contact sensors remember touches [s].
 
     Raises:
         UserError: if a file is missing, MuJoCo cannot compile it, the arena is a robot
@@ -77,12 +82,12 @@ def compiled(arena: Path, robot: Path) -> Compiled:
             "only, or a robot by <include>",
         )
     with _complaints(robot):
-        alone = _spec(robot_files).compile()
+        alone = _robot(robot_files, control_step).compile()
     index_of(alone, mujoco.mjtObj.mjOBJ_BODY, OWN_BODY, robot)
     with _complaints(arena):
         spec = _spec(arena_files)
         make_whole(spec)
-        frame = _attach(spec, _spec(robot_files))
+        frame = _attach(spec, _robot(robot_files, control_step))
         model, floor, height = lay_floor(spec, frame)
     if model.nflex:
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX.value, 0)
@@ -120,6 +125,20 @@ def _spec(files: SourceFiles) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_file(
         str(files.main), include={str(path): text for path, text in files.xml.items()}
     )
+
+
+def _robot(files: SourceFiles, control_step: float) -> mujoco.MjSpec:
+    """A robot whose contact sensors remember the physics steps of a control step.
+
+    And whose rays remember their last value, so that they need not be new in each.
+    """
+    spec = _spec(files)
+    for sensor in spec.sensors:
+        if sensor.type == mujoco.mjtSensor.mjSENS_RANGEFINDER:
+            sensor.nsample = 1
+        elif sensor.type == mujoco.mjtSensor.mjSENS_CONTACT and spec.option.timestep:
+            sensor.nsample = max(1, round(control_step / spec.option.timestep))
+    return spec
 
 
 def _attach(arena: mujoco.MjSpec, robot: mujoco.MjSpec) -> mujoco.MjsFrame:

@@ -6,6 +6,7 @@ differ in their base only, which the methods of `Scene` hide from other modules.
 robot's physics is its own in every arena: see `mjcf`.
 """
 
+import copy
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -32,6 +33,10 @@ from epuck_mj.scene.robot_parts import (
 from epuck_mj.step.sensors import Reading
 
 _OBJECT, _SENSOR = mujoco.mjtObj, mujoco.mjtSensor
+_DISABLE = mujoco.mjtDisableBit
+
+FEW_GEOMS = 64
+"""Below this number, geoms are faster compared one by one than in a tree of boxes."""
 
 Measure = TypeVar("Measure", bound=Callable[..., Any])
 
@@ -63,6 +68,7 @@ class Scene:
     height: float
     _distance: np.ndarray
     _contact: int
+    _touches: slice
 
     @cached_property
     def _base(self) -> tuple[int, bool]:
@@ -96,11 +102,37 @@ class Scene:
         yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
         return np.concatenate([qpos[..., base : base + 2], yaw[..., None]], axis=-1)
 
-    def reading(self, sensordata: np.ndarray) -> Reading:
-        """Reading of the robot, from MuJoCo's `(..., nsensordata)`."""
-        return Reading(
-            sensordata[..., self._distance], sensordata[..., self._contact] > 0
+    def sparing(self) -> mujoco.MjModel:
+        """The model without work that a robot does not need that is read once a step.
+
+        Its rays are new at the end of each control step only. A robot that is read
+        then moves and senses as in `model`, to the bit.
+        """
+        model = copy.copy(self.model)
+        rays = model.sensor_type == _SENSOR.mjSENS_RANGEFINDER
+        # a little less, for the rounding of MuJoCo's time
+        model.sensor_interval[rays, 0] = (
+            self.n_substeps * model.opt.timestep * (1 - 1e-7)
         )
+        model.opt.disableflags |= int(_DISABLE.mjDSBL_ISLAND)
+        if model.ngeom < FEW_GEOMS:
+            model.opt.disableflags |= int(_DISABLE.mjDSBL_MIDPHASE)
+        return model
+
+    def reading(
+        self, sensordata: np.ndarray, history: np.ndarray | None = None
+    ) -> Reading:
+        """Reading of the robot.
+
+        Args:
+            sensordata: MuJoCo's, `(..., nsensordata)`.
+            history: MuJoCo's, `(..., nhistory)`, to count touches at all physics steps
+                of the last control step; None for those of now.
+        """
+        contact = sensordata[..., self._contact] > 0
+        if history is not None:
+            contact |= (history[..., self._touches] > 0).any(axis=-1)
+        return Reading(sensordata[..., self._distance], contact)
 
 
 def once_per_model(measure: Measure) -> Measure:
@@ -143,7 +175,7 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
         UserError: if a file is missing or broken, or a part of the robot is.
     """
     robot_path, arena_path = find_robot(robot), find_arena(arena)
-    made = compiled(arena_path, robot_path)
+    made = compiled(arena_path, robot_path, control_step)
     model = made.model
     check_base(model, robot_path)
     index_of(model, _OBJECT.mjOBJ_GEOM, SHELL, robot_path)
@@ -180,4 +212,16 @@ def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
         made.height,
         np.array(distance),
         contact,
+        _samples(model, SHELL),
     )
+
+
+def _samples(model: mujoco.MjModel, sensor: str) -> slice:
+    """Where MuJoCo's history has the values that a sensor remembers.
+
+    Behind two numbers of its own and the times come the values.
+    """
+    index = model.sensor(sensor).id
+    n = int(model.sensor_history[index, 0])
+    first = int(model.sensor_historyadr[index]) + 2 + n
+    return slice(first, first + n * int(model.sensor_dim[index]))
