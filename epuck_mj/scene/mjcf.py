@@ -56,7 +56,9 @@ class Compiled:
     height: float
 
 
-def compiled(arena: Path, robot: Path, control_step: float) -> Compiled:
+def compiled(
+    arena: Path, robot: Path, control_step: float, physics_step: float | None = None
+) -> Compiled:
     """A robot in an arena, compiled.
 
     A robot that the arena includes is left out.
@@ -65,6 +67,7 @@ def compiled(arena: Path, robot: Path, control_step: float) -> Compiled:
         arena: path of the arena's MJCF.
         robot: path of the robot's MJCF.
         control_step: how long the robot's contact sensors remember touches [s].
+        physics_step: in place of the robot's own [s], if not None.
 
     Raises:
         UserError: if a file is missing, MuJoCo cannot compile it, the arena is a robot
@@ -82,12 +85,12 @@ def compiled(arena: Path, robot: Path, control_step: float) -> Compiled:
             "only, or a robot by <include>",
         )
     with _complaints(robot):
-        alone = _robot(robot_files, control_step).compile()
+        alone = _robot(robot_files, control_step, physics_step).compile()
     index_of(alone, mujoco.mjtObj.mjOBJ_BODY, OWN_BODY, robot)
     with _complaints(arena):
         spec = _spec(arena_files)
         make_whole(spec)
-        frame = _attach(spec, _robot(robot_files, control_step))
+        frame = _attach(spec, _robot(robot_files, control_step, physics_step))
         model, floor, height = lay_floor(spec, frame)
     if model.nflex:
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX.value, 0)
@@ -127,12 +130,15 @@ def _spec(files: SourceFiles) -> mujoco.MjSpec:
     )
 
 
-def _robot(files: SourceFiles, control_step: float) -> mujoco.MjSpec:
+def _robot(
+    files: SourceFiles, control_step: float, physics_step: float | None
+) -> mujoco.MjSpec:
     """A robot whose contact sensors remember the physics steps of a control step.
 
     And whose rays remember their last value, so that they need not be new in each.
     """
     spec = _spec(files)
+    spec.option.timestep = physics_step or spec.option.timestep
     for sensor in spec.sensors:
         if sensor.type == mujoco.mjtSensor.mjSENS_RANGEFINDER:
             sensor.nsample = 1

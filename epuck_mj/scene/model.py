@@ -163,19 +163,25 @@ REMEMBERED = 32
 """Number of results of each function that are kept in memory."""
 
 
-def load_scene(robot: str, arena: str, control_step: float = 0.1) -> Scene:
+def load_scene(
+    robot: str,
+    arena: str,
+    control_step: float = 0.1,
+    physics_step: float | None = None,
+) -> Scene:
     """Put a robot into an arena.
 
     Args:
         robot: name of a shipped robot, or path of an MJCF with the same interface.
         arena: name of a shipped arena, or path of an MJCF with walls.
         control_step: its duration [s], a multiple of the physics step.
+        physics_step: its duration [s]; None is the robot's own.
 
     Raises:
         UserError: if a file is missing or broken, or a part of the robot is.
     """
     robot_path, arena_path = find_robot(robot), find_arena(arena)
-    made = compiled(arena_path, robot_path, control_step)
+    made = compiled(arena_path, robot_path, control_step, physics_step)
     model = made.model
     check_base(model, robot_path)
     index_of(model, _OBJECT.mjOBJ_GEOM, SHELL, robot_path)

@@ -1,0 +1,113 @@
+"""How much truth each rung tells: `python -m benchmarks.ladder`, or `make ladder`.
+
+Controllers live on the same starts on each rung and on the reference: the robot on
+wheels with a fifth of its physics step. Writes figures as it goes; a measurement that
+was stopped goes on where it was. Then it writes the page and its picture.
+"""
+
+import json
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.ladder.controllers import tried
+from benchmarks.ladder.page import write_page
+from epuck_mj.host import files
+from epuck_mj.host.command_line import main, parse
+from epuck_mj.rungs.table import robots_in
+from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.control import START_CLEARANCE, run_trials
+
+ARENAS = {"arena": 1, "l_shape": 3, "pillars": 3, "octagon": 3}
+"""Arenas, and of how many controllers one is measured there."""
+
+REFERENCE = "reference"
+REFINEMENT = 5
+"""The reference's physics step is this many times shorter."""
+
+START_SEED = 2026
+
+
+def _reference(arena: str) -> Scene:
+    step = load_scene("epuck", arena).model.opt.timestep
+    return load_scene("epuck", arena, physics_step=step / REFINEMENT)
+
+
+def _end_of_step(arena: str) -> Scene:
+    """On wheels, where a touch that is over at the end of a control step is no crash."""
+    return replace(load_scene("epuck", arena), _touches=slice(0))
+
+
+COLUMNS: Mapping[str, Callable[[str], Scene]] = {
+    REFERENCE: _reference,
+    "epuck": lambda arena: load_scene("epuck", arena),
+    "epuck, touches at the end": _end_of_step,
+    "epuck_kinematic": lambda arena: load_scene("epuck_kinematic", arena),
+    "epuck_planar": lambda arena: load_scene("epuck_planar", arena),
+}
+"""What is compared, and how its scene is made."""
+
+Measured = dict[str, dict[str, dict[str, list[float]]]]
+"""By arena, column and controller: mean fitness and share of trials that crashed."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Compare the rungs with a robot on wheels that moves in finer steps.
+
+    Attributes:
+        results: folder with studies, whose champions are tried.
+        json: file for the figures; figures that are there are not measured again.
+        page: page to write; its picture gets the same name.
+        starts: trials of each controller in the square; half as many elsewhere.
+        threads: threads that step the robots; 0 is one per core.
+    """
+
+    results: Path = Path("results")
+    json: Path = Path("results/ladder.json")
+    page: Path = Path("benchmarks/ladder.md")
+    starts: int = 200
+    threads: int = 0
+
+
+def ladder(argv: list[str]) -> int:
+    """Run the command line; its exit status."""
+    options = parse(Options, "python -m benchmarks.ladder", argv, Options())
+    controllers = tried(options.results)
+    found: Measured = {}
+    if options.json.is_file():
+        found = json.loads(files.read_text(options.json))
+    for arena, every in ARENAS.items():
+        n = options.starts if every == 1 else options.starts // 2
+        for name, scene_in in COLUMNS.items():
+            column = found.setdefault(arena, {}).setdefault(name, {})
+            scene = scene_in(arena)
+            # the same for all columns
+            starts = FreeSpace(load_scene("epuck", arena), START_CLEARANCE).sample(
+                np.random.default_rng(START_SEED), n
+            )
+            robots = robots_in(scene, n, options.threads)
+            for each in controllers[::every]:
+                if each.name not in column:
+                    trials = run_trials(robots, each.policy(n), starts, each.task)
+                    column[each.name] = [
+                        round(float(trials.fitness.mean()), 3),
+                        round(float(trials.crashed.mean()), 4),
+                    ]
+                    _save(options.json, found)
+            print(f"{arena}: {name}", file=sys.stderr, flush=True)
+    write_page(options.page, found, controllers, options.starts)
+    return 0
+
+
+def _save(path: Path, found: Measured) -> None:
+    with files.writing():
+        files.write_text(path, json.dumps(found, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main(ladder)

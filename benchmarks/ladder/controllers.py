@@ -1,0 +1,116 @@
+"""The controllers that the ladder is measured with.
+
+A controller lives from the errors of the simulator that it evolved on. So controllers
+that evolved on each of them are among these, besides some that did not evolve far.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from epuck_mj.policies.file import load_controller
+from epuck_mj.policies.network import Network
+from epuck_mj.policies.topology import Topology
+from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT
+from epuck_mj.step.control import BatchPolicy, TaskParameters
+from evolution.run.champion import choose_champion, stored_by
+from evolution.run.generation_loop import Evolution
+from evolution.run.history import read_best_individuals
+from evolution.settings.config_files import find_config, load_config
+
+CHAMPION, EARLIER, RANDOM, BY_HAND = "champion", "earlier", "random", "by hand"
+
+SHARES = (0.05, 0.3)
+"""Generations whose best individuals are taken, as shares of a run."""
+
+EARLIER_SEEDS = 2
+"""Number of runs of each experiment whose earlier generations are taken."""
+
+N_RANDOM = 20
+
+KINEMATIC_SEEDS = range(1, 11)
+"""Seeds of the runs of DE/best on the kinematic robot, which are made here."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A controller of the ladder.
+
+    Attributes:
+        name: where it comes from.
+        kind: CHAMPION, EARLIER, RANDOM or BY_HAND.
+        evolved_on: name of the robot; empty if it did not evolve.
+        task: what its trials are.
+        topology: of its network; None for the hand-written wall follower.
+        genome: of its network, `(genes,)`.
+    """
+
+    name: str
+    kind: str
+    evolved_on: str
+    task: TaskParameters
+    topology: Topology | None
+    genome: np.ndarray
+
+    def policy(self, n: int) -> BatchPolicy:
+        """The controller, for `n` robots."""
+        if self.topology is None:
+            return WallFollower()
+        return self.topology.decode(np.tile(self.genome, (n, 1)))
+
+
+def tried(results: Path) -> list[Tried]:
+    """All controllers.
+
+    Args:
+        results: folder with studies.
+    """
+    task, nothing = TaskParameters(), np.zeros(0)
+    found = [Tried("wall-follower", BY_HAND, "", task, None, nothing)]
+    rng = np.random.default_rng(2026)
+    for i, genome in enumerate(rng.uniform(-5, 5, (N_RANDOM, Network().n_genes))):
+        found.append(Tried(f"random {i}", RANDOM, "", task, Network(), genome))
+    for path in sorted(results.glob("*/*/seed-*/champion.json"), key=_by_seed):
+        found += _of_run(path.parent, path.parent.relative_to(results).as_posix())
+    return found + list(_on_kinematic_robot())
+
+
+def _by_seed(champion: Path) -> tuple[Path, int]:
+    return champion.parents[1], int(champion.parent.name.removeprefix("seed-"))
+
+
+def _of_run(run: Path, name: str) -> Iterator[Tried]:
+    """The champion of a run and, of the first runs, the best of earlier generations."""
+    file = load_controller(run)
+    robot, network = Path(file.origin.robot).stem, file.network
+    yield Tried(name, CHAMPION, robot, file.task, network, file.genome)
+    if _by_seed(run / "champion.json")[1] > EARLIER_SEEDS:
+        return
+    _, genomes = read_best_individuals(run / "best_individuals.npz", network.n_genes)
+    for share in SHARES:
+        generation = round(share * len(genomes))
+        which = f"{name}, generation {generation}"
+        yield Tried(which, EARLIER, robot, file.task, network, genomes[generation])
+
+
+def _on_kinematic_robot() -> Iterator[Tried]:
+    """Champions of DE/best that have met no other robot."""
+    config = load_config(find_config("de-best")).model_copy(
+        update={"robot": KINEMATIC_ROBOT, "climb": 1.0, "finalists": 0}
+    )
+    for seed in KINEMATIC_SEEDS:
+        evolution = Evolution(config.model_copy(update={"seed": seed}))
+        for _ in evolution.run():
+            pass
+        champion = choose_champion(evolution.engine, evolution, stored_by(evolution))
+        yield Tried(
+            f"kinematic/de-best/seed-{seed}",
+            CHAMPION,
+            KINEMATIC_ROBOT,
+            config.task,
+            config.topology,
+            champion.genome,
+        )
