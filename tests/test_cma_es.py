@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from cmaes import CMA
 
 from evolution.search.cma_es import (
     CmaEs,
@@ -12,6 +11,7 @@ from evolution.search.cma_es import (
     stagnation_window,
 )
 from evolution.search.search_space import SearchSpace
+from evolution.search.symmetric_cma import SymmetricCma
 
 SPACE = SearchSpace(genes=3, lower=-5, upper=5, init_lower=-5, init_upper=5)
 
@@ -92,7 +92,7 @@ def test_the_smallest_population_searches(genes):
 def test_it_is_the_packages():
     optimizer = make(seed=7, restarts=False)
     rng = np.random.default_rng(7)
-    cma = CMA(
+    cma = SymmetricCma(
         mean=rng.uniform(-5, 5, size=3),
         sigma=2.0,
         bounds=np.array([[-5, 5]] * 3),
@@ -104,6 +104,23 @@ def test_it_is_the_packages():
         np.testing.assert_array_equal(optimizer.ask(), genomes)
         cma.tell([(genome, float(np.sum(genome**2))) for genome in genomes])
         optimizer.tell(sphere(np.array(genomes)))
+
+
+def test_samples_do_not_depend_on_which_eigenvectors_the_library_finds():
+    rng = np.random.default_rng(1)
+    rotation, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    # equal eigenvalues: every rotation of the first two axes is as good
+    lengths = np.array([2.0, 2.0, 0.5])
+    c, s = np.cos(0.7), np.sin(0.7)
+    turned = rotation @ np.array([[c, -s, 0], [s, c, 0], [0, 0, -1]])
+    samples = []
+    for axes in (rotation, turned):
+        cma = SymmetricCma(mean=np.ones(3), sigma=1.0, seed=5)
+        cma._B, cma._D = axes, lengths
+        samples.append([cma.ask() for _ in range(2000)])
+    np.testing.assert_allclose(samples[0], samples[1], rtol=0, atol=1e-12)
+    covariance = rotation * lengths**2 @ rotation.T
+    np.testing.assert_allclose(np.cov(np.transpose(samples[0])), covariance, atol=0.4)
 
 
 def test_it_turns_to_a_narrow_oblique_valley():

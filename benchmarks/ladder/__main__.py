@@ -38,7 +38,7 @@ def _reference(arena: str) -> Scene:
 
 
 def _end_of_step(arena: str) -> Scene:
-    """On wheels, where a touch that is over at the end of a control step is no crash."""
+    """On wheels; a touch that is over at the end of a control step is no crash."""
     return replace(load_scene("epuck", arena), _touches=slice(0))
 
 

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from epuck_mj.errors import UserError
@@ -50,6 +51,7 @@ def provenance(
         "versions": {
             "python": platform.python_version(),
             **{package: version(package) for package in PACKAGES},
+            "blas": _blas(),
         },
         "git": _git(),
         "mjcf_sha256": dict(scene.sha256),
@@ -59,6 +61,12 @@ def provenance(
         "started": now(),
         "finished": None,
     }
+
+
+def _blas() -> str:
+    """Name and version of numpy's linear algebra, on which CMA-ES depends."""
+    blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
+    return f"{blas['name']} {blas['version']}"
 
 
 class _Git(BaseModel, frozen=True, strict=True):

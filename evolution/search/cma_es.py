@@ -9,7 +9,8 @@ population. A genome outside the bounds is drawn again up to 100 times, then cli
 A `cmaes.CMA` cannot be saved without pickle or its private attributes. But it is a
 function of its seed and of what it was told: that is the state, and it is restored by
 asking and telling everything again. Randomness is drawn in this order: for each start
-the mean, then the seed of `cmaes`, which has a bit generator of its own.
+the mean, then the seed of `cmaes`, which has a bit generator of its own. Samples are
+those of `SymmetricCma`.
 
 Source:
     N. Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772; restarts:
@@ -169,13 +170,13 @@ class CmaEs(Optimizer):
     def _started(self, population: int) -> "CMA":
         """A new search with this population at a random mean."""
         # with scipy behind it: for those who use it
-        from cmaes import CMA
+        from evolution.search.symmetric_cma import SymmetricCma
 
         # fitness of the best and of the median individual of each of its generations
         self._history: list[tuple[float, float]] = []
         space = self._space
         mean = self.rng.uniform(space.init_lower, space.init_upper, size=space.genes)
-        return CMA(
+        return SymmetricCma(
             mean=mean,
             sigma=self._parameters.sigma,
             bounds=np.tile([space.lower, space.upper], (space.genes, 1)),
