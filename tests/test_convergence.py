@@ -60,7 +60,7 @@ def fitness() -> dict[str, dict[str, float]]:
 @pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
 def test_a_fifth_of_the_step_gives_the_same_fitness(robot, fitness):
     scene = load_scene(robot, "arena")
-    finer = Configuration(scene.model.opt.timestep / REFINEMENT).applied(scene)
+    finer = Configuration(scene.model.opt.timestep / REFINEMENT).scene(robot)
     assert finer.n_substeps == REFINEMENT * scene.n_substeps
     starts = held_out_starts(scene, N_STARTS)
     reference = mean_fitness(finer, chosen(), starts)
@@ -77,8 +77,7 @@ def test_wheels_keep_what_the_plane_gives(fitness):
 @pytest.mark.parametrize("step", [1 / 30, 1 / 50])
 def test_a_coarse_step_is_told_apart(step, fitness):
     """The check can fail: at 20 ms the wheeled robot ruins a good controller."""
-    scene = load_scene("epuck", "arena")
-    coarse = Configuration(step).applied(scene)
-    starts = held_out_starts(scene, N_STARTS)
+    coarse = Configuration(step).scene("epuck")
+    starts = held_out_starts(coarse, N_STARTS)
     spoilt = mean_fitness(coarse, chosen(), starts)
     assert deviation(spoilt, fitness["epuck"]) > 2 * TOLERANCE

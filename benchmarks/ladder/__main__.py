@@ -7,7 +7,7 @@ was stopped goes on where it was. Then it writes the page and its picture.
 
 import json
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -74,7 +74,7 @@ class Options:
     threads: int = 0
 
 
-def ladder(argv: list[str]) -> int:
+def ladder(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
     options = parse(Options, "python -m benchmarks.ladder", argv, Options())
     controllers = tried(options.results)
