@@ -4,6 +4,8 @@
 (b) our batch evaluator with the 8-4-2 policy and fitness, on 1 and on 2 threads;
 (c) a straightforward dm_control episode loop with the same policy.
 
+And the kinematic robot against wheels: see `kinematic`.
+
 Shared machines are noisy, so the three are measured in turns and only ratios of one
 turn count; the medians over all turns are reported. Shares of one core are ratios of
 CPU time; what two threads gain is wall time and wants an idle machine.
@@ -23,6 +25,7 @@ import numpy as np
 import tyro
 from dm_control.rl import control
 
+from benchmarks.kinematic import measure_kinematic
 from epuck_mj.environments.dm_control import FollowWalls, environment
 from epuck_mj.policies.network import Controller, Network
 from epuck_mj.scene.model import Scene, load_scene
@@ -74,6 +77,10 @@ def main(options: Options) -> None:
         print(robot)
         for name, value in results[robot].items():
             print(f"  {name:36} {value:10.4g}")
+    results["epuck_kinematic"] = measure_kinematic(options.repeats)
+    print("epuck_kinematic")
+    for name, value in results["epuck_kinematic"].items():
+        print(f"  {name:36} {value:10.4g}")
     if options.json is not None:
         options.json.write_text(json.dumps(results, indent=1) + "\n")
 
