@@ -29,7 +29,7 @@ SHARES = (0.05, 0.3)
 EARLIER_SEEDS = 2
 """Number of runs of each experiment whose earlier generations are taken."""
 
-N_RANDOM = 20
+N_RANDOM = 15
 
 KINEMATIC_SEEDS = range(1, 11)
 """Seeds of the runs of DE/best on the kinematic robot, which are made here."""
@@ -70,12 +70,13 @@ def tried(results: Path) -> list[Tried]:
     """
     task, nothing = TaskParameters(), np.zeros(0)
     found = [Tried("wall-follower", BY_HAND, "", task, None, nothing)]
-    rng = np.random.default_rng(2026)
-    for i, genome in enumerate(rng.uniform(-5, 5, (N_RANDOM, Network().n_genes))):
-        found.append(Tried(f"random {i}", RANDOM, "", task, Network(), genome))
     for path in sorted(results.glob("*/*/seed-*/champion.json"), key=_by_seed):
         found += _of_run(path.parent, path.parent.relative_to(results).as_posix())
-    return found + list(_on_kinematic_robot())
+    found += _on_kinematic_robot()
+    genomes = np.random.default_rng(2026).uniform(-5, 5, (N_RANDOM, Network().n_genes))
+    for i, genome in enumerate(genomes):
+        found.append(Tried(f"random {i}", RANDOM, "", task, Network(), genome))
+    return found
 
 
 def _by_seed(champion: Path) -> tuple[Path, int]:
