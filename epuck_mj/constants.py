@@ -64,7 +64,7 @@ tyre friction be integrated with one physics step: see benchmarks/convergence.md
 """
 
 DRIVE_GAIN = 0.02
-"""Gain of a wheel's velocity servo [N m s/rad]: a time constant of about 15 ms.
+"""Gain of a wheel's velocity servo [N m s/rad]: the time constant is 17 ms.
 
 Chosen: the real motor takes a new rate at once (FIRMWARE), with its tyre slipping.
 """

@@ -6,6 +6,7 @@ import pytest
 from mujoco.batch import Batch
 
 from epuck_mj import constants as c
+from epuck_mj.rungs.table import RUNGS, robots_in
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.robot_parts import PREFIX, SHELL, WHEELS
 
@@ -164,3 +165,26 @@ def test_random_driving_warns_of_nothing(scene):
     assert touched.sum() > 0.05 * n_robots * n_calls
     inside = np.abs(scene.poses(batch.bind("qpos"))[:, :2]) < 0.5
     assert inside.all()
+
+
+@pytest.mark.parametrize("robot", RUNGS)
+@pytest.mark.parametrize("step", [None, 0.002])
+def test_robots_fall_behind_their_commands_by_17_ms(robot, step):
+    """Whatever the physics step: what is late is the way, not only the speed."""
+    scene = load_scene(robot, "large_square", physics_step=step)
+    robots, speed = robots_in(scene, 1, 1), 4.0
+    late = []
+    for left in (speed, -speed / 2):
+        robots.reset(np.zeros((1, 3)))
+        for _ in range(10):
+            robots.step(np.array([[left, abs(left)]]))
+        x, _, yaw = robots.poses()[0]
+        full = (
+            left * c.WHEEL_RADIUS if left > 0 else 2 * c.WHEEL_RADIUS / c.TRACK * -left
+        )
+        late.append(1 - (x if left > 0 else yaw) / full)
+    time_constants = np.array([0.0167, 0.0164])
+    # tyres slip a little
+    slip = 0.0016 if robot == "epuck" else 1e-4
+    assert (late >= time_constants - 1e-4).all()
+    assert (late <= time_constants + slip).all()
