@@ -185,6 +185,23 @@ def shell_command(module: str, *arguments: str | Path) -> str:
     return shlex.join([str(python), "-m", module, *map(str, arguments)])
 
 
+def check_ending(flag: str, path: Path | None, ending: str) -> None:
+    """Refuse a file of another kind than a command writes, such as one of a run.
+
+    Args:
+        flag: its name.
+        path: of the file, if one is asked for.
+        ending: that its name has to have.
+
+    Raises:
+        UserError: for another ending.
+    """
+    if path is not None and path.suffix.lower() != ending:
+        raise UserError(
+            f"--{flag}: expected a name that ends in {ending}, got '{path}'"
+        )
+
+
 def check_threads(threads: int) -> None:
     """Refuse negative or too large numbers of threads; 0 stands for one per core.
 
