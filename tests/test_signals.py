@@ -69,7 +69,7 @@ LATEST["study"] = 12.0 if THOROUGH else 1.0
 SAME = ["config.yaml", "history.csv", "best_individuals.npz", "checkpoint.npz"]
 SAME += ["champion.json"]
 SAME += THOROUGH * ["fitness.png", "trajectory.png", "trajectory.npz"]
-"""Files whose bytes are promised: rerun gives its recordings random identities."""
+"""Files whose bytes are promised: rerun gives parts of recordings random identities."""
 
 SAME_STUDY = ["study.yaml", "seeds.yaml", *THOROUGH * ["wall-follower.json"]]
 
