@@ -25,7 +25,8 @@ ENDS = 2.0
 DRIVES = 0.5
 """How long a robot is in order and drives [s]."""
 
-TITLES = ("peer", "link", "stands [s]", "ends [s]", "ends after SIGINT [s]", "says")
+TITLES = ("peer", "link", "stands [s]", "ends [s]", "ends after SIGINT [s]")
+TITLES += ("machine late [s]", "says")
 
 
 @dataclass(frozen=True)
@@ -37,12 +38,14 @@ class Meeting:
         ended: when it ended, after the fault or the signal [s].
         last: what it said last.
         gone: whether there was nobody to tell to stand.
+        late: longest time that the peer waited for its turn on this machine [s].
     """
 
     stood: float | None
     ended: float
     last: str
     gone: bool
+    late: float
 
     @property
     def sound(self) -> bool:
@@ -86,6 +89,7 @@ def meet(name: str, link: str, interrupt: bool) -> Meeting:
         ended=ended - asked,
         last=f"{said[-1]} ({process.returncode})",
         gone=peer.hangs_up and not peer.returns,
+        late=hostile.lateness,
     )
 
 
@@ -95,7 +99,8 @@ def row(name: str, link: str) -> tuple[str, bool]:
     stood = "nobody there" if fault.stood is None and fault.gone else "NEVER"
     if fault.stood is not None:
         stood = f"{fault.stood:.2f}"
-    cells = [name, link, stood, f"{fault.ended:.2f}", f"{asked.ended:.2f}", fault.last]
+    times = (fault.ended, asked.ended, max(fault.late, asked.late))
+    cells = [name, link, stood, *(f"{time:.2f}" for time in times), fault.last]
     return f"| {' | '.join(cells)} |", fault.sound and asked.sound
 
 
