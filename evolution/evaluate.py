@@ -10,7 +10,13 @@ from typing import Annotated
 import tyro
 
 from epuck_mj.host import files
-from epuck_mj.host.command_line import check_threads, main, parse, word
+from epuck_mj.host.command_line import (
+    check_ending,
+    check_threads,
+    main,
+    parse,
+    word,
+)
 from epuck_mj.host.limits import check_flag
 from epuck_mj.step.conditions import ConditionFlags, Conditions
 from epuck_mj.step.disturbances import Disturbances
@@ -63,6 +69,7 @@ def evaluate_policies(argv: Sequence[str]) -> int:
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     check_flag("starts", options.starts)
     check_threads(options.threads)
+    check_ending("json", options.json, ".json")
     candidates = policies_of(options.paths, options.generations)
     conditions = options.robots.conditions or Conditions()
     if options.json is not None:

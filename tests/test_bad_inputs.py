@@ -255,6 +255,7 @@ def sound(tmp_path_factory):
     return directory
 
 
+@pytest.mark.usefixtures("handlers")
 @pytest.mark.parametrize("share", range(SHARES))
 def test_bad_inputs_are_one_line(share, sound, tmp_path, monkeypatch, capfd):
     said = {}

@@ -588,6 +588,8 @@ def test_picture_shows_walls_and_region(check, monkeypatch):
     _, lines = check("<mujoco/>", "--picture", "none.png")
     assert not Path("none.png").exists()
     assert lines[-1] == "no picture: there are no walls to draw"
+    with pytest.raises(UserError, match=r"--picture: expected .* \.png, got 'my\.xml'"):
+        check(ARENA, "--picture", "my.xml")
     with pytest.raises(UserError, match="cannot write"):
         check(ARENA, "--picture", "no/folder.png")
 

@@ -170,7 +170,8 @@ def test_a_robot_that_was_measured(finished, tmp_path):
     for wrong, message in {
         (str(finished), *own): "calibration needs noise: calibrated or strong, got",
         (*options, *own, "--randomise"): "expected randomise or calibration, got both",
-        (*options, "--json", str(tmp_path)): "cannot write .* it is a folder",
+        (*options, "--json", str(tmp_path)): "--json: expected a name that ends in .j",
+        (*options, "--json", "run/history.csv"): "ends in .json, got 'run/history.csv'",
         (*options, "--json", "no/out.json"): "cannot write .*no folder 'no'",
         (*options, "--calibration", "no.yaml"): "cannot read 'no.yaml'",
     }.items():

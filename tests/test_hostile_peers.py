@@ -1,6 +1,7 @@
 """The bridge against robots that go wrong: wheels stand soon, and it ends soon.
 
-Sessions are in threads of this process; a few bridges are processes of their own.
+Sessions are in threads of this process; a few bridges are processes of their own, as
+all are in `python -m tests.meet_hostile_peers`.
 """
 
 import os
@@ -23,14 +24,9 @@ from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import TaskParameters
 from tests.hostile_peers import LINKS, PEERS, Hostile
+from tests.meet_hostile_peers import ENDS, STANDS
 from tests.processes import PATIENCE, python_process
 from tests.test_fake import wait_for
-
-STANDS = 0.5
-"""Longest time from a fault to wheels that are told to stand [s]."""
-
-ENDS = 2.0
-"""Longest time from a fault, or a signal, to the end [s]."""
 
 AT_ONCE = {False: 12, True: 2}
 """Peers at once: those that flood keep a processor busy."""

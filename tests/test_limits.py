@@ -10,8 +10,8 @@ from epuck_mj.constants import SPEED_MAX, TURN_RATE_MAX
 from epuck_mj.errors import UserError
 from epuck_mj.host import memory
 from epuck_mj.host.limits import LIMITS, check, check_flag, shown
-from epuck_mj.host.xml_text import DEPTH_MAX, ELEMENTS_MAX, check_xml
 from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.scene.xml_elements import DEPTH_MAX, ELEMENTS_MAX, elements_of
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.trials.recorder import record_tracks, record_trajectories
@@ -151,24 +151,30 @@ def test_what_is_recorded_is_refused_before_it_is_made(planar, small):
     [
         (
             "<a>" * 200_000,
-            f"line 1: expected at most {ELEMENTS_MAX} elements, at most 1",
+            f", line 1: expected at most {DEPTH_MAX} elements inside one another",
         ),
-        ("<a>\n" * 101 + "</a>" * 101, "line 101: expected at most"),
-        ("<a>" + "<b/>" * 100_000 + "</a>", "line 1: expected at most"),
-        ('<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>', "expected no entities of its own"),
-        ("<a><b></a>", "is not XML: mismatched tag: line 1"),
-        ("", "is not XML: no element found"),
-        ("<a>\0</a>", "is not XML"),
-        ("<a>&b;</a>", "is not XML: undefined entity"),
+        ("<a>\n" * 501 + "</a>" * 501, ", line 501: expected at most"),
+        (
+            "<a>" + "<b/>" * ELEMENTS_MAX + "</a>",
+            f", line 1: expected at most {ELEMENTS_MAX:,} elements",
+        ),
+        ('<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>', "expected no definitions of"),
+        ("<a><b></a>", ", line 1: not well-formed XML: mismatched tag"),
+        ("", "not well-formed XML: no element found"),
+        ("<a>\0</a>", "not well-formed XML"),
+        ("<a>&b;</a>", "not well-formed XML: undefined entity"),
     ],
 )
 def test_xml_that_is_no_arena_is_refused_before_it_is_parsed(text, said):
     with pytest.raises(UserError) as error:
-        check_xml(text, Path("my.xml"))
+        elements_of(text, Path("my.xml"))
     assert str(error.value).startswith("'my.xml'")
     assert said in str(error.value)
 
 
 def test_other_xml_is_let_through():
-    check_xml("<a>" * DEPTH_MAX + "</a>" * DEPTH_MAX, Path("my.xml"))
-    check_xml('<?xml version="1.0" encoding="utf-16"?><a b="ä"/><!-- c -->', Path())
+    deep = elements_of("<a>" * DEPTH_MAX + "</a>" * DEPTH_MAX, Path("my.xml"))
+    assert [element.depth for element in deep] == list(range(DEPTH_MAX))
+    text = '<?xml version="1.0" encoding="utf-16"?><a b="ä"/><!-- c -->'
+    (element,) = elements_of(text, Path("my.xml"))
+    assert (element.tag, element.attributes) == ("a", {"b": "ä"})

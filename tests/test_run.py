@@ -926,7 +926,7 @@ def test_a_robot_changed_since_is_refused_on_resume(refusal, here, no_pictures, 
     )
     (here / "mine.xml").write_text(FULL.replace("kv=", "kv=  "))
     capfd.readouterr()
-    refusal("--resume", "run")
+    assert " has been edited since: robot (see " in refusal("--resume", "run")
 
 
 def test_a_run_on_an_own_robot_can_be_resumed_from_elsewhere(

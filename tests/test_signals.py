@@ -1,7 +1,8 @@
 """Signals at random moments: whatever ends a run or a study, it is gone on with.
 
-`SIGNALS=100 python -m pytest tests/test_signals.py` sends that many, and compares
-pictures as well: about ten minutes.
+More of them, and others, with pictures, by hand; 100 take about ten minutes:
+
+    SIGNALS=100 SIGNALS_SEED=2 python -m pytest -s tests/test_signals.py
 """
 
 import os
@@ -12,10 +13,12 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from evolution.run.__main__ import evolve
 from evolution.run.directory import RunDirectory
+from evolution.run.history import Record
 from evolution.run.means import Means
 from evolution.study import __main__ as study_command
 from evolution.study.__main__ import study
@@ -28,8 +31,9 @@ pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="signals of POSIX"),
 ]
 
-N = int(os.environ.get("SIGNALS", "6"))
-THOROUGH = N > 6
+N = int(os.environ.get("SIGNALS", "4"))
+SEED = int(os.environ.get("SIGNALS_SEED", "1"))
+THOROUGH = N > 4
 
 ENDINGS = [signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP]
 STATUS = {
@@ -40,52 +44,117 @@ STATUS = {
     signal.SIGINT: (130, -signal.SIGINT),
 }
 
-SIZE = "steps: 20\ntrials: 2\nevaluations: 240\nvalidation_starts: 5\ntest_starts: 5\n"
+EVALUATIONS = 1000 if THOROUGH else 120
+SIZE = f"steps: 20\ntrials: 2\nevaluations: {EVALUATIONS}\n"
+SIZE += "validation_starts: 5\ntest_starts: 5\n"
+DE = "optimizer: {algorithm: differential_evolution, strategy: best, population: 10, "
+DE += "scale: 0.8, crossover: 1.0}\n"
+GA = "optimizer: {algorithm: genetic_algorithm, population: 10}\n"
+CLIMB = "robot: epuck_kinematic\nclimb: 0.5\n"
 EXPERIMENTS = {
-    "one": "{algorithm: genetic_algorithm, population: 10}",
-    "two": "{algorithm: differential_evolution, strategy: best, population: 10, "
-    "scale: 0.8, crossover: 1.0}",
+    "wheels": SIZE + "robot: epuck\n" + GA,
+    "climb": SIZE + CLIMB + DE,
+    "climb_ga": SIZE + CLIMB + GA,
 }
-SEEDS = (1, 2)
+OF_STUDY = ("climb", "climb_ga")
+SEEDS = (1, 2) if THOROUGH else (1,)
+
+COMMANDS = ("wheels", "climb", "study", "climb")
+"""What is interrupted, in turn."""
+
+LATEST = {name: 5.0 if THOROUGH else 0.6 for name in EXPERIMENTS}
+LATEST["study"] = 12.0 if THOROUGH else 1.0
+"""Latest moment after a run has begun, in times that it needs until then."""
 
 SAME = ["config.yaml", "history.csv", "best_individuals.npz", "checkpoint.npz"]
 SAME += ["champion.json"]
-PICTURES = ["fitness.png", "trajectory.png", "trajectory.npz"]
-"""Files whose bytes are promised: rerun gives its recordings random identities."""
+SAME += THOROUGH * ["fitness.png", "trajectory.png", "trajectory.npz"]
+"""Files whose bytes are promised: rerun gives parts of recordings random identities."""
+
+SAME_STUDY = ["study.yaml", "seeds.yaml", *THOROUGH * ["wall-follower.json"]]
 
 
 @pytest.fixture(scope="module")
 def references(tmp_path_factory):
-    """The same runs, which nothing interrupts, and how long a process takes [s]."""
+    """The same study, and the same run on wheels, which nothing interrupts."""
     folder = tmp_path_factory.mktemp("references")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        if not THOROUGH:
-            draw_nothing(patch)
-        write_study(folder)
-        for name in EXPERIMENTS:
-            for seed in SEEDS:
-                output = ["--output", f"{name}-{seed}"]
-                assert evolve([f"{name}.yaml", "--seed", str(seed), *output]) == 0
+        write_experiments(folder)
+        for name in ("study", "wheels"):
+            finish(command(name, folder / name), folder, patch)
     return folder
 
 
-def write_study(folder: Path) -> None:
-    for name, optimizer in EXPERIMENTS.items():
-        (folder / f"{name}.yaml").write_text(f"{SIZE}optimizer: {optimizer}\n")
-    (folder / "both.yaml").write_text("experiments: [one.yaml, two.yaml]\n")
+def write_experiments(folder: Path) -> None:
+    for name, text in EXPERIMENTS.items():
+        (folder / f"{name}.yaml").write_text(text)
+    both = ", ".join(f"{name}.yaml" for name in OF_STUDY)
+    (folder / "both.yaml").write_text(f"experiments: [{both}]\n")
 
 
-def assert_reproduced(run: Path, reference: Path) -> None:
-    assert RunDirectory(run).finished
-    for name in SAME + THOROUGH * PICTURES:
-        assert (run / name).read_bytes() == (reference / name).read_bytes(), (run, name)
+def command(name: str, output: Path) -> list[str]:
+    """What begins one of `COMMANDS`, or goes on with it."""
+    if name == "study":
+        seeds = ",".join(map(str, SEEDS))
+        argv = ["evolution.study", "both.yaml", "--jobs", "2", "--seeds", seeds]
+        return [*argv, "--output", str(output)]
+    if RunDirectory(output).begun:
+        return ["evolution.run", "--resume", str(output)]
+    return ["evolution.run", f"{name}.yaml", "--output", str(output)]
 
 
-def interrupted(argv: list[str], cwd: Path, rng: random.Random, longest: float) -> bool:
+def runs(name: str, output: Path) -> dict[Path, str]:
+    """Run directories of a command, with the references that are the same."""
+    if name == "study":
+        each = [f"{name}/seed-{seed}" for name in OF_STUDY for seed in SEEDS]
+        return {output / name: f"study/{name}" for name in each}
+    return {output: name if name == "wheels" else f"study/{name}/seed-1"}
+
+
+def assert_reproduced(name: str, output: Path, references: Path) -> None:
+    for run, same in runs(name, output).items():
+        assert RunDirectory(run).finished
+        for file in SAME:
+            expected = (references / same / file).read_bytes()
+            assert (run / file).read_bytes() == expected, (run, file)
+    for file in SAME_STUDY * (name == "study"):
+        expected = (references / "study" / file).read_bytes()
+        assert (output / file).read_bytes() == expected, (output, file)
+
+
+def stage(run: Path) -> str:
+    """How far a run has come, by what is on disk."""
+    directory = RunDirectory(run)
+    if directory.finished:
+        return "finished"
+    if directory.champion.is_file():
+        return "showing"
+    if not directory.checkpoint.is_file():
+        return "begun" if directory.begun else "nothing"
+    with np.load(directory.checkpoint) as state:
+        last = dict(zip(Record.__dataclass_fields__, state["records"][-1], strict=True))
+    if last["evaluations"] > EVALUATIONS - 20:
+        return "judging"
+    if not directory.stored_config().climbs:
+        return "evolving"
+    if last["climbed"]:
+        return "climbed"
+    at = last["evaluations"] >= EVALUATIONS / 2
+    return "at the climb" if at else "before the climb"
+
+
+def moment(rng: random.Random, loading: float, latest: float) -> float:
+    """When a signal comes [s]: a third while modules load, then rather early."""
+    if rng.random() < 0.3:
+        return rng.uniform(0, loading)
+    return loading * (0.9 + latest * 10 ** rng.uniform(-2, 0))
+
+
+def interrupted(
+    argv: list[str], cwd: Path, signum: signal.Signals, moment: float
+) -> bool:
     """Start a command and end it by a signal; whether that came before its end."""
-    signum = rng.choice(ENDINGS)
-    moment = rng.uniform(0, longest)
     with python_process("-m", *argv, cwd=cwd) as process:
         begun = time.monotonic()
         try:
@@ -101,47 +170,37 @@ def interrupted(argv: list[str], cwd: Path, rng: random.Random, longest: float) 
     if "evolution" in stderr or moment > 0.2:
         assert "Traceback" not in stderr, case
         assert "Exception ignored" not in stderr, case
-    print(argv[0], argv[1], signum.name, f"{moment:.2f} s", process.returncode)
     return process.returncode != 0
 
 
+def time_to_begin(folder: Path) -> float:
+    """Time until a run has begun [s]: the slower the machine, the later are signals."""
+    started, output = time.monotonic(), folder / "first"
+    with python_process("-m", *command("wheels", output), cwd=folder):
+        while not RunDirectory(output).begun:
+            assert time.monotonic() < started + PATIENCE
+            time.sleep(0.01)
+    return time.monotonic() - started
+
+
 def test_runs_and_studies_are_gone_on_with(references, tmp_path, monkeypatch):
-    rng, left, case = random.Random(f"signals {N}"), N, 0
-    # the slower the machine, the later are the moments
-    begun = time.monotonic()
-    with python_process("-m", "evolution.run", "-h", cwd=tmp_path) as process:
-        process.communicate(timeout=PATIENCE)
-    loading = time.monotonic() - begun
+    rng, n, case = random.Random(f"signals {SEED}"), 0, 0
     monkeypatch.chdir(tmp_path)
-    write_study(tmp_path)
-    while left > 0:
+    write_experiments(tmp_path)
+    loading = time_to_begin(tmp_path)
+    while n < N:
+        name = COMMANDS[case % len(COMMANDS)]
         case += 1
-        output = tmp_path / f"{case}"
-        if case % 3:
-            name = rng.choice(list(EXPERIMENTS))
-            new = ["evolution.run", f"{name}.yaml", "--output", str(output)]
-            again = ["evolution.run", "--resume", str(output)]
-            runs = {output: references / f"{name}-1"}
-            longest = 6 * loading
-        else:
-            new = ["evolution.study", "both.yaml", "--jobs", "2"]
-            new += ["--seeds", "1-2", "--output", str(output)]
-            again = new
-            runs = {
-                output / name / f"seed-{seed}": references / f"{name}-{seed}"
-                for name in EXPERIMENTS
-                for seed in SEEDS
-            }
-            longest = 15 * loading
-        # while it loads, evolves, and tests its champion
-        for _ in range(min(left, rng.randint(1, 3))):
-            argv = again if RunDirectory(output).begun else new
-            if not interrupted(argv, tmp_path, rng, longest):
+        output = tmp_path / f"{case}-{name}"
+        for _ in range(min(N - n, rng.randint(1, 3) if THOROUGH else 1)):
+            signum, when = ENDINGS[n % 4], moment(rng, loading, LATEST[name])
+            if not interrupted(command(name, output), tmp_path, signum, when):
                 break
-            left -= 1
-        finish(again if RunDirectory(output).begun else new, tmp_path, monkeypatch)
-        for run, reference in runs.items():
-            assert_reproduced(run, reference)
+            n += 1
+            stages = "; ".join(stage(run) for run in runs(name, output))
+            print(f"| {n} | {name} | {signum.name} | {when:.2f} s | {stages} |")
+        finish(command(name, output), tmp_path, monkeypatch)
+        assert_reproduced(name, output, references)
 
 
 def finish(argv: list[str], cwd: Path, monkeypatch: pytest.MonkeyPatch) -> None:

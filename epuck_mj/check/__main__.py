@@ -12,7 +12,7 @@ from typing import Annotated
 
 import tyro
 
-from epuck_mj.host.command_line import main, parse, word
+from epuck_mj.host.command_line import check_ending, main, parse, word
 from epuck_mj.scene.model_files import SHIPPED_ROBOTS
 
 EXAMPLES = (
@@ -39,6 +39,7 @@ class Options:
 def check(argv: Sequence[str]) -> int:
     """Check an arena and print the findings; the exit status."""
     options = parse(Options, "python -m epuck_mj.check", argv, examples=EXAMPLES)
+    check_ending("picture", options.picture, ".png")
     # physics and pictures are for a command that makes sense
     from epuck_mj.check import report
     from epuck_mj.check.arena import check_arena

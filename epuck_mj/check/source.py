@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import mujoco
 
 from epuck_mj.check.findings import Finding, Place, Unusable, error, names
-from epuck_mj.scene.mjcf import make_whole
+from epuck_mj.scene.mjcf import WHOLE_MODEL, make_whole
 from epuck_mj.scene.source_files import SourceFiles, named_files, source_files
 from epuck_mj.scene.xml_elements import ELEMENTS_MAX, BadXml, Element
 
@@ -106,7 +106,7 @@ def settings_not_used(files: SourceFiles) -> list[str]:
     for element in files.elements:
         if element.depth == 1:
             inside = element.tag in ("option", "size")
-        whole = element.tag == "compiler" and not WHOLE.isdisjoint(element.attributes)
+        whole = element.tag == "compiler" and WHOLE_MODEL.keys() & element.attributes
         if whole or (inside and element.attributes):
             found.append(f"{element.shown} of line {element.line}")
         for name in TOUCH if element.tag == "geom" else ():
@@ -115,9 +115,6 @@ def settings_not_used(files: SourceFiles) -> list[str]:
     lines = [(name, lines) for name, lines in touch.items() if lines]
     return found + [f"{name} of geoms ({names(lines)})" for name, lines in lines]
 
-
-WHOLE = {"settotalmass", "boundmass", "boundinertia", "balanceinertia"}
-"""Settings of the compiler that would change masses of the robot."""
 
 TOUCH = ("margin", "gap", "priority")
 """Attributes of geoms that would change how the robot touches them."""

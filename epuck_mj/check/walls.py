@@ -98,8 +98,9 @@ def moving_findings(model: mujoco.MjModel, places: Places) -> list[Finding]:
             *(["touching it is a crash"] if (its & hit).any() else []),
             *(["rays see it"] if (its & seen).any() else []),
         ]
-        text = f"it moves, so it is no wall: {' and '.join(does)}, but no clearance "
-        findings.append(warning(TOPIC, f"{text}or figure has it", places.body(body)))
+        text = f"it moves, so it is no wall: {' and '.join(does)}, but clearances and "
+        text += "figures of runs leave it out"
+        findings.append(warning(TOPIC, text, places.body(body)))
     return findings
 
 

@@ -14,15 +14,16 @@ import tyro
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import loading
-from epuck_mj.host.hardship import (
-    complain,
-    give_up_streams,
-    hardship,
-    standard_streams,
-)
+from epuck_mj.host.hardship import hardship
 from epuck_mj.host.interruption import follows, not_dropped, send_soon
 from epuck_mj.host.limits import check_flag
-from epuck_mj.host.output import OUTPUT_LOST, OutputLost
+from epuck_mj.host.output import (
+    OUTPUT_LOST,
+    OutputLost,
+    complain,
+    give_up_streams,
+    standard_streams,
+)
 
 Options = TypeVar("Options")
 
@@ -135,10 +136,10 @@ def main(run: Callable[[Sequence[str]], int]) -> None:
     try:
         status = _status(run)
     except OutputLost as error:
-        complain(str(error))
+        complain(f"error: {error}")
         status = OUTPUT_LOST
     except UserError as error:
-        complain(str(error))
+        complain(f"error: {error}")
         status = 2
     except KeyboardInterrupt:
         status = loading.INTERRUPTED
@@ -152,7 +153,7 @@ def main(run: Callable[[Sequence[str]], int]) -> None:
         elif line is None:
             raise
         else:
-            complain(line)
+            complain(f"error: {line}")
             status = 2
     give_up_streams()
     # nothing is left to be tidied up
@@ -182,6 +183,23 @@ def shell_command(module: str, *arguments: str | Path) -> str:
     else:
         python = Path("python")
     return shlex.join([str(python), "-m", module, *map(str, arguments)])
+
+
+def check_ending(flag: str, path: Path | None, ending: str) -> None:
+    """Refuse a file of another kind than a command writes, such as one of a run.
+
+    Args:
+        flag: its name.
+        path: of the file, if one is asked for.
+        ending: that its name has to have.
+
+    Raises:
+        UserError: for another ending.
+    """
+    if path is not None and path.suffix.lower() != ending:
+        raise UserError(
+            f"--{flag}: expected a name that ends in {ending}, got '{path}'"
+        )
 
 
 def check_threads(threads: int) -> None:

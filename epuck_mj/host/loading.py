@@ -10,7 +10,8 @@ import sys
 from pathlib import Path
 from types import TracebackType
 
-from epuck_mj.host.hardship import complain, hardship
+from epuck_mj.host.hardship import hardship
+from epuck_mj.host.output import complain
 
 PACKAGES = ("epuck_mj", "evolution")
 SCRIPT = "epuck-mj"
@@ -69,5 +70,5 @@ def _report(
     if line is None:
         sys.__excepthook__(kind, error, where)
         return
-    complain(line)
+    complain(f"error: {line}")
     os._exit(2)

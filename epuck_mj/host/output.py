@@ -1,11 +1,16 @@
-"""Standard output and error, which may be closed, full, or read by nobody."""
+"""Standard output and error, which may be closed, full, or read by nobody.
+
+Only what every Python has is imported: this is there before all else is loaded.
+"""
 
 import contextlib
+import errno
 import io
 import os
 import queue
 import sys
 import threading
+from pathlib import Path
 from typing import Self, TextIO
 
 from epuck_mj.errors import UserError
@@ -111,23 +116,54 @@ def say(text: str, end: str = "\n") -> None:
         ) from None
 
 
-def complain(text: str) -> None:
+def complain(line: str) -> None:
     """Write a line to standard error or, if that is lost, to standard output."""
     for stream in (sys.stderr, sys.stdout):
-        with contextlib.suppress(OutputLost), Output(stream) as output:
-            output.say(text)
-            output.finish()
+        with contextlib.suppress(OutputLost, OSError):
+            try:
+                with Output(stream) as output:
+                    output.say(line)
+                    output.finish()
+            except (RuntimeError, MemoryError):
+                # there is no memory for a thread
+                _write_at_once(stream, f"{line}\n")
             return
 
 
-def occupy_standard_streams() -> None:
-    """Open what the shell closed on nothing, lest a port or a file takes its number."""
-    for number in range(3):
+def standard_streams() -> None:
+    """Make standard output and error fit for any text.
+
+    A name that the terminal has no letters for is shown with escapes.
+
+    Raises:
+        UserError: if standard output is closed.
+    """
+    if sys.stderr is None:
+        # nobody wants to read it
+        sys.stderr = open_nowhere()
+    if sys.stdout is None:
+        sys.stdout = open_nowhere()
+        raise UserError(f"standard output: {os.strerror(errno.EBADF)}")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def open_nowhere() -> TextIO:
+    """A stream that forgets everything."""
+    return Path(os.devnull).open("w", encoding="utf-8")
+
+
+def give_up_streams() -> None:
+    """Let streams that cannot be written forget what they hold.
+
+    Python's own flush at the end would complain of it.
+    """
+    for stream in (sys.stdout, sys.stderr):
         try:
-            os.fstat(number)
-        except OSError:
-            # the lowest that is free
-            os.open(os.devnull, os.O_RDWR)
+            stream.flush()
+        except (OSError, ValueError):
+            abandon(stream)
 
 
 def abandon(stream: TextIO) -> None:

@@ -12,10 +12,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.files import is_file
+from epuck_mj.host.files import is_file, read_text
 from epuck_mj.scene.model_files import SHIPPED_ROBOTS
 from epuck_mj.scene.robot_parts import OWN_BODY
-from epuck_mj.scene.xml_elements import BadXml, Element, elements_of, read_xml
+from epuck_mj.scene.xml_elements import BadXml, Element, elements_of
+
+XML_MAX = 50_000_000
+"""Largest XML file that is read [bytes]."""
 
 NOTHING = b"<mujoco><worldbody/></mujoco>"
 """What MuJoCo reads in place of a robot that an arena includes."""
@@ -97,7 +100,7 @@ def _expanded(
     found: SourceFiles, path: Path, folder: Path, robots_stay: bool
 ) -> list[Element]:
     """Elements of an XML file of the model in a folder, includes expanded."""
-    text = read_xml(path)
+    text = read_text(path, XML_MAX)
     own = elements_of(text, path)
     if path != found.main and not robots_stay and defines_robot(own):
         found.xml[path] = NOTHING

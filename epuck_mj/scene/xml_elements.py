@@ -1,7 +1,5 @@
 """Elements of an XML file, with the lines on which they stand."""
 
-import codecs
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,21 +8,11 @@ from xml.parsers import expat
 
 from epuck_mj.errors import UserError
 
-SIZE_MAX = 50_000_000
-"""Largest XML file that is read [bytes]."""
-
 DEPTH_MAX = 500
 """Most elements inside one another; MuJoCo's parser stops there, too."""
 
 ELEMENTS_MAX = 200_000
 """Most elements of a file."""
-
-_BOMS = (
-    (codecs.BOM_UTF8, "utf-8-sig"),
-    (codecs.BOM_UTF16_LE, "utf-16"),
-    (codecs.BOM_UTF16_BE, "utf-16"),
-)
-_DECLARED = re.compile(rb"""<\?xml[^>]*encoding\s*=\s*["']([\w.-]+)["']""")
 
 
 @dataclass(frozen=True)
@@ -68,29 +56,6 @@ class BadXml(UserError):
     def of(cls, element: Element, problem: str) -> Self:
         """Something wrong with an element."""
         return cls(problem, element.file, element.line, element)
-
-
-def read_xml(path: Path) -> str:
-    """Text of an XML file, in the encoding that it declares.
-
-    Raises:
-        UserError: if it is missing, too large, or in another encoding.
-    """
-    try:
-        # a device has no end
-        if path.stat().st_size > SIZE_MAX or not path.is_file():
-            raise BadXml(f"expected a file of at most {SIZE_MAX:,} bytes", path)
-        content = path.read_bytes()
-    except OSError as error:
-        raise UserError(f"cannot read '{path}': {error.strerror}") from None
-    encoding = next((name for bom, name in _BOMS if content.startswith(bom)), None)
-    declared = _DECLARED.match(content)
-    try:
-        return content.decode(
-            encoding or (declared[1].decode() if declared else "utf-8")
-        )
-    except (ValueError, LookupError) as error:
-        raise UserError(f"cannot read '{path}': {error}") from None
 
 
 def elements_of(text: str, path: Path) -> list[Element]:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import main, parse
+from epuck_mj.host.command_line import check_ending, main, parse
 from evolution.replay.options import Options
 
 MODULE = "evolution.replay"
@@ -18,6 +18,9 @@ EXAMPLES = (
 def replay(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
+    check_ending("save", options.save, ".rrd")
+    check_ending("video", options.video, ".mp4")
+    check_ending("image", options.image, ".png")
     paths = [path for path in (options.path, *options.compare) if path]
     if not paths:
         raise UserError(

@@ -172,11 +172,12 @@ class RunDirectory:
             ) from None
 
     def _refuse_other_models(self, first: dict, now: dict) -> None:
-        before, after = first.get("mjcf_sha256"), now["mjcf_sha256"]
-        if before != after:
+        before, after = first.get("mjcf_sha256") or {}, now["mjcf_sha256"]
+        names = sorted(n for n in before | after if before.get(n) != after.get(n))
+        if names:
             raise UserError(
                 f"cannot resume '{self.path}': its robot or arena has been edited "
-                f"since (SHA-256 {before}, now {after})"
+                f"since: {', '.join(names)} (see mjcf_sha256 in '{self.provenance}')"
             )
         own = first.get("own_sha256", {})
         for name, after in now["own_sha256"].items():
