@@ -6,7 +6,7 @@ RUN := runs/de-best-seed-1
 CHAMPION := results/paper/de-best/seed-1
 PAPERS := de-best de-rand ga
 
-.PHONY: run test bench convergence racing overhead recording bridge gap results figures clean
+.PHONY: run test bench ladder convergence racing overhead recording bridge gap results figures clean
 
 run: $(INSTALLED)
 	@if [ -f $(RUN)/config.yaml ]; then \
@@ -24,6 +24,10 @@ test: $(INSTALLED)
 
 bench: $(INSTALLED)
 	$(BIN)/python -m benchmarks.throughput --json results/throughput.json
+
+# how much truth each robot tells: about an hour on two cores; it goes on where it was
+ladder: $(INSTALLED)
+	$(BIN)/python -m benchmarks.ladder
 
 convergence: $(INSTALLED)
 	$(BIN)/python -m benchmarks.convergence
