@@ -52,7 +52,12 @@ COLUMNS: Mapping[str, Callable[[str], Scene]] = {
 """What is compared, and how its scene is made."""
 
 Measured = dict[str, dict[str, dict[str, list[float]]]]
-"""By arena, column and controller: mean fitness and share of trials that crashed."""
+"""By arena, column and controller: mean fitness and share of trials that crashed.
+
+Under EVOLVED are genomes of the controllers that were evolved here.
+"""
+
+EVOLVED = "evolved here"
 
 
 @dataclass(frozen=True)
@@ -77,10 +82,12 @@ class Options:
 def ladder(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
     options = parse(Options, "python -m benchmarks.ladder", argv, Options())
-    controllers = tried(options.results)
     found: Measured = {}
     if options.json.is_file():
         found = json.loads(files.read_text(options.json))
+    evolved = found.setdefault(EVOLVED, {}).setdefault("genomes", {})
+    controllers = tried(options.results, evolved)
+    _save(options.json, found)
     for arena, every in ARENAS.items():
         n = options.starts if every == 1 else options.starts // 2
         for name, scene_in in COLUMNS.items():
@@ -100,7 +107,8 @@ def ladder(argv: Sequence[str]) -> int:
                     ]
                     _save(options.json, found)
             print(f"{arena}: {name}", file=sys.stderr, flush=True)
-    write_page(options.page, found, controllers, options.starts)
+    in_arenas = {arena: found[arena] for arena in ARENAS}
+    write_page(options.page, in_arenas, controllers, options.starts)
     return 0
 
 

@@ -62,17 +62,19 @@ class Tried:
         return self.topology.decode(np.tile(self.genome, (n, 1)))
 
 
-def tried(results: Path) -> list[Tried]:
+def tried(results: Path, evolved: dict[str, list[float]]) -> list[Tried]:
     """All controllers.
 
     Args:
         results: folder with studies.
+        evolved: genomes of the runs made here, by name; those that it lacks are evolved
+            and added.
     """
     task, nothing = TaskParameters(), np.zeros(0)
     found = [Tried("wall-follower", BY_HAND, "", task, None, nothing)]
     for path in sorted(results.glob("*/*/seed-*/champion.json"), key=_by_seed):
         found += _of_run(path.parent, path.parent.relative_to(results).as_posix())
-    found += _on_kinematic_robot()
+    found += _on_kinematic_robot(evolved)
     genomes = np.random.default_rng(2026).uniform(-5, 5, (N_RANDOM, Network().n_genes))
     for i, genome in enumerate(genomes):
         found.append(Tried(f"random {i}", RANDOM, "", task, Network(), genome))
@@ -90,28 +92,27 @@ def _of_run(run: Path, name: str) -> Iterator[Tried]:
     yield Tried(name, CHAMPION, robot, file.task, network, file.genome)
     if _by_seed(run / "champion.json")[1] > EARLIER_SEEDS:
         return
-    _, genomes = read_best_individuals(run / "best_individuals.npz", network.n_genes)
+    genomes, _ = read_best_individuals(run / "best_individuals.npz", network.n_genes)
     for share in SHARES:
         generation = round(share * len(genomes))
         which = f"{name}, generation {generation}"
         yield Tried(which, EARLIER, robot, file.task, network, genomes[generation])
 
 
-def _on_kinematic_robot() -> Iterator[Tried]:
+def _on_kinematic_robot(evolved: dict[str, list[float]]) -> Iterator[Tried]:
     """Champions of DE/best that have met no other robot."""
     config = load_config(find_config("de-best")).model_copy(
         update={"robot": KINEMATIC_ROBOT, "climb": 1.0, "finalists": 0}
     )
     for seed in KINEMATIC_SEEDS:
-        evolution = Evolution(config.model_copy(update={"seed": seed}))
-        for _ in evolution.run():
-            pass
-        champion = choose_champion(evolution.engine, evolution, stored_by(evolution))
-        yield Tried(
-            f"kinematic/de-best/seed-{seed}",
-            CHAMPION,
-            KINEMATIC_ROBOT,
-            config.task,
-            config.topology,
-            champion.genome,
-        )
+        name = f"kinematic/de-best/seed-{seed}"
+        if name not in evolved:
+            evolution = Evolution(config.model_copy(update={"seed": seed}))
+            for _ in evolution.run():
+                pass
+            engine, stored = evolution.engine, stored_by(evolution)
+            champion = choose_champion(engine, evolution, stored)
+            evolved[name] = champion.genome.tolist()
+        genome = np.array(evolved[name])
+        task, topology = config.task, config.topology
+        yield Tried(name, CHAMPION, KINEMATIC_ROBOT, task, topology, genome)
