@@ -21,7 +21,7 @@ import tyro
 from epuck_mj.bridge.drive.robot import RealRobot
 from epuck_mj.bridge.drive.session import Session
 from epuck_mj.bridge.fake.builds import BUILDS
-from epuck_mj.bridge.fake.mujoco_body import Journal
+from epuck_mj.bridge.fake.simulated_body import Journal
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.bridge.line.serial_port import SerialPort

@@ -2,7 +2,7 @@
 
 `same_times` takes from the robot's journal *when* commands came and sensors were read,
 and nothing else: observations, actions, commands and motion are its own, by
-`MujocoRobots` and the functions that evolution uses. `nominal` takes nothing:
+`robots_in` and the functions that evolution uses. `nominal` takes nothing:
 control steps all alike, sensors read at their ends, motors never late.
 
 Both quantise as the robot does: whole counts, whole steps/s, whole ticks a step.
@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from epuck_mj.bridge.fake.motors_and_sensors import MotorTimer, Wheel
-from epuck_mj.bridge.fake.mujoco_body import Journal
+from epuck_mj.bridge.fake.simulated_body import Journal
 from epuck_mj.rungs.disturbed import DisturbedRobots
-from epuck_mj.rungs.mujoco_batch import MujocoRobots
+from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.control import Policy, TaskParameters, control_step
 from epuck_mj.step.disturbances import Noise, draw_disturbances
@@ -47,7 +47,7 @@ def same_times(
     Raises:
         ValueError: if the journal's commands are not as many as the policy's.
     """
-    robots = MujocoRobots(replace(scene, n_substeps=1), 1, 1)
+    robots = robots_in(replace(scene, n_substeps=1), 1, 1)
     distances = [robots.reset(start[None]).distance[0]]
     poses = [robots.poses()[0]]
     wheels, pauses = (Wheel(0.0, 0.0),) * 2, np.zeros(2)
@@ -104,7 +104,7 @@ def nominal(
         n_steps: control steps.
     """
     met = draw_disturbances(np.random.default_rng(0), 1, n_steps, QUIET)
-    robots = DisturbedRobots(MujocoRobots(scene, 1, 1), met, task.control_step)
+    robots = DisturbedRobots(robots_in(scene, 1, 1), met, task.control_step)
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     poses = [robots.poses()[0]]
     for k in range(n_steps):

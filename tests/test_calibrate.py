@@ -17,8 +17,8 @@ import pytest
 
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Pty
-from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import scenario
+from epuck_mj.bridge.fake.simulated_body import SimulatedBody
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.bridge.line.wifi_line import WifiLine
@@ -206,7 +206,7 @@ def test_rays_are_shortest_where_a_wall_is_faced(robot):
 # whole calibrations
 
 
-class Body(MujocoBody):
+class Body(SimulatedBody):
     """An e-puck of its own: sensors with gains, offsets and noise; can be lifted."""
 
     gains = np.ones(N_PROXIMITY)
@@ -224,14 +224,12 @@ class Body(MujocoBody):
 
     def proximity(self):
         deviations = self.noise * self.rng.standard_normal(N_PROXIMITY)
-        counts = counted(self._reading().distance, self.gains, deviations)
+        counts = counted(self._reading.distance[0], self.gains, deviations)
         return np.minimum(counts.astype(int) + self.offset, PROXIMITY_COUNT_MAX)
 
     def place(self, pose):
         with self.lock:
-            self._data.qpos[:] = self._scene.qpos(np.array(pose, float))
-            self._data.qvel[:] = 0
-            mujoco.mj_step1(self._scene.model, self._data)
+            self._reading = self._robots.reset(np.array([pose], float))
             self._note()
 
 

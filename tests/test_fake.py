@@ -18,8 +18,8 @@ from epuck_mj.bridge.failures import LinkLost
 from epuck_mj.bridge.fake.__main__ import fake
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Pty, Tcp, serve
-from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import scenario
+from epuck_mj.bridge.fake.simulated_body import SimulatedBody
 from epuck_mj.bridge.language import ascii, binary
 from epuck_mj.bridge.language.protocol import RESYNC
 from epuck_mj.bridge.language.replies import Steps
@@ -29,6 +29,7 @@ from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.constants import TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import read_arrays
+from epuck_mj.rungs.table import RUNGS
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.step.motors import STEP_ANGLE
 from tests.processes import PATIENCE, python_process
@@ -61,7 +62,7 @@ def living(
     faults="",
 ) -> AbstractContextManager[Emulator]:
     """An emulated robot behind an endpoint, in real time."""
-    body = MujocoBody(scene, np.array(start, float), time.monotonic())
+    body = SimulatedBody(scene, np.array(start, float), time.monotonic())
     emulator = Emulator(body, robot, time.monotonic(), scenario(faults))
     return behind(endpoint, emulator)
 
@@ -84,10 +85,10 @@ def endpoint(request, tmp_path):
 # the body
 
 
-@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
+@pytest.mark.parametrize("robot", RUNGS)
 def test_a_body_rolls_as_its_motors_turn(robot):
     scene = load_scene(robot, "arena")
-    body = MujocoBody(scene, np.array([-0.3, 0.0, 0.0]), 10.0)
+    body = SimulatedBody(scene, np.array([-0.3, 0.0, 0.0]), 10.0)
     emulator = Emulator(body, "asercom", 10.0)
     emulator.exchange(b"D,600,600\r", 10.0)
     for k in range(1000):
@@ -106,7 +107,7 @@ def test_a_body_rolls_as_its_motors_turn(robot):
 
 
 def test_a_body_turns_on_the_spot(planar):
-    body = MujocoBody(planar, np.zeros(3), 0.0)
+    body = SimulatedBody(planar, np.zeros(3), 0.0)
     emulator = Emulator(body, "asercom", 0.0)
     emulator.exchange(b"D,-500,500\r", 0.0)
     for k in range(400):
@@ -116,7 +117,7 @@ def test_a_body_turns_on_the_spot(planar):
 
 
 def test_a_robot_at_a_wall_pushes_and_goes_on_counting(planar):
-    body = MujocoBody(planar, np.array([0.42, 0.0, 0.0]), 0.0)
+    body = SimulatedBody(planar, np.array([0.42, 0.0, 0.0]), 0.0)
     emulator = Emulator(body, "asercom", 0.0)
     emulator.exchange(b"D,1000,1000\r", 0.0)
     for k in range(600):
@@ -128,7 +129,7 @@ def test_a_robot_at_a_wall_pushes_and_goes_on_counting(planar):
 
 def test_pauses_of_slow_motors_are_lost_way(planar):
     def way(again):
-        body = MujocoBody(planar, np.zeros(3), 0.0)
+        body = SimulatedBody(planar, np.zeros(3), 0.0)
         emulator = Emulator(body, "asercom", 0.0)
         for k in range(200):
             told = k == 0 or (again and k % 10 == 0)

@@ -18,8 +18,8 @@ from epuck_mj.bridge.failures import (
 )
 from epuck_mj.bridge.fake.builds import BUILDS
 from epuck_mj.bridge.fake.emulator import Emulator
-from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import Fault, random_scenario, scenario
+from epuck_mj.bridge.fake.simulated_body import SimulatedBody
 from epuck_mj.bridge.language.replies import Cycle, Proximity, Steps, wrapped
 from epuck_mj.bridge.line.interfaces import Greeting
 from epuck_mj.bridge.line.last_resort import stop_at_last
@@ -37,6 +37,7 @@ from epuck_mj.constants import (
 from epuck_mj.errors import UserError
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.rungs.table import RUNGS
 from epuck_mj.scene.model import load_scene
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import TaskParameters
@@ -65,7 +66,7 @@ class World:
         **options,
     ):
         self.time = VirtualTime()
-        self.body = MujocoBody(scene, np.asarray(start, float), 0.0)
+        self.body = SimulatedBody(scene, np.asarray(start, float), 0.0)
         faults = scenario(faults) if isinstance(faults, str) else faults
         self.emulator = Emulator(
             self.body, robot, 0.0, faults, latency, options.pop("seed", 0)
@@ -330,7 +331,7 @@ def test_a_slow_line_is_an_overrun_and_no_step_is_shorter(planar):
     assert np.diff(times).min() > 0.09
 
 
-@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
+@pytest.mark.parametrize("robot", RUNGS)
 @pytest.mark.parametrize("build", BUILDS)
 def test_the_loop_is_the_simulations(robot, build):
     """The emulated robot goes where the simulation goes, at the same times.

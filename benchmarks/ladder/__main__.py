@@ -68,7 +68,7 @@ class Options:
         results: folder with studies, whose champions are tried.
         json: file for the figures; figures that are there are not measured again.
         page: page to write; its picture gets the same name.
-        starts: trials of each controller in the square; half as many elsewhere.
+        starts: trials of each controller in the square; a quarter elsewhere.
         threads: threads that step the robots; 0 is one per core.
     """
 
@@ -89,7 +89,7 @@ def ladder(argv: Sequence[str]) -> int:
     controllers = tried(options.results, evolved)
     _save(options.json, found)
     for arena, every in ARENAS.items():
-        n = options.starts if every == 1 else options.starts // 2
+        n = options.starts if every == 1 else options.starts // 4
         for name, scene_in in COLUMNS.items():
             column = found.setdefault(arena, {}).setdefault(name, {})
             scene = scene_in(arena)

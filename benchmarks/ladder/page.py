@@ -151,7 +151,7 @@ and on the reference: the robot on wheels with a fifth of its physics step, wher
 touch in any physics step is a crash. Controllers are the shipped champions, the bests
 of early and middle generations, random genomes, the hand-written wall follower, and
 champions of DE/best that were evolved on the kinematic robot alone. In arenas other
-than the square, a third of the controllers have half as many starts. Sensors are
+than the square, a third of the controllers have a quarter of these starts. Sensors are
 ideal. Fitness is of 300.
 
 *epuck, touches at the end* is the robot on wheels when only those touches are crashes

@@ -32,7 +32,7 @@ EXAMPLES = (
 
 @dataclass(frozen=True)
 class Options:
-    """Emulate an e-puck with a body in MuJoCo behind a serial port, until Ctrl-C.
+    """Emulate an e-puck with a simulated body behind a serial port, until Ctrl-C.
 
     Attributes:
         arena: name of a shipped arena, or path of an MJCF file.
@@ -73,7 +73,7 @@ def fake(argv: Sequence[str]) -> int:
     # physics is not for those who only ask for help
     from epuck_mj.bridge.fake.emulator import WIFI, Emulator
     from epuck_mj.bridge.fake.endpoints import Pty, Tcp, serve
-    from epuck_mj.bridge.fake.mujoco_body import MujocoBody
+    from epuck_mj.bridge.fake.simulated_body import SimulatedBody
     from epuck_mj.scene.model import load_scene
 
     faults = (
@@ -88,7 +88,7 @@ def fake(argv: Sequence[str]) -> int:
     def clock() -> float:
         return (time.monotonic() - origin) * options.speed
 
-    body = MujocoBody(scene, np.array([x, y, math.radians(degrees)]), clock())
+    body = SimulatedBody(scene, np.array([x, y, math.radians(degrees)]), clock())
     robot = options.firmware if options.wifi is None else WIFI
     tcp = options.tcp if options.wifi is None else options.wifi
     emulator = Emulator(body, robot, clock(), faults, options.latency, options.seed)

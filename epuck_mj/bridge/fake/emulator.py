@@ -6,8 +6,8 @@ import numpy as np
 
 from epuck_mj.bridge.fake.builds import BUILDS
 from epuck_mj.bridge.fake.firmware import Firmware
-from epuck_mj.bridge.fake.mujoco_body import MujocoBody
 from epuck_mj.bridge.fake.scenarios import GARBAGE_MAX, LOSS, Fault
+from epuck_mj.bridge.fake.simulated_body import SimulatedBody
 from epuck_mj.bridge.fake.talker import Talker
 from epuck_mj.bridge.fake.wifi_firmware import WifiFirmware
 from epuck_mj.bridge.fake.wire import Wire
@@ -30,7 +30,7 @@ class Emulator:
 
     def __init__(
         self,
-        body: MujocoBody,
+        body: SimulatedBody,
         robot: str,
         now: float,
         faults: Sequence[Fault] = (),

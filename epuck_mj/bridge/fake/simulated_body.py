@@ -1,4 +1,4 @@
-"""The emulated e-puck's body: a robot in a scene of MuJoCo.
+"""The emulated e-puck's body: a simulated robot.
 
 Time is divided into physics steps. A command takes effect in the next step, and a
 sensor reading is that of the last step. Both are recorded, so that a simulation can be
@@ -8,18 +8,18 @@ that comes a millisecond early or late still falls into the same physics step.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import mujoco
 import numpy as np
 
 from epuck_mj.bridge.fake.motors_and_sensors import Wheel
 from epuck_mj.constants import N_PROXIMITY, PROXIMITY_COUNT_MAX
 from epuck_mj.host.files import write_arrays, writing
+from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.motors import STEP_ANGLE
-from epuck_mj.step.sensors import Reading, proximity
+from epuck_mj.step.sensors import proximity
 
 LEAD = 0.0045
 """Delay with which later commands still meet their physics step [s]. Chosen.
@@ -65,7 +65,7 @@ class Journal:
             write_arrays(path, {"timestep": np.array(timestep), **arrays})
 
 
-class MujocoBody:
+class SimulatedBody:
     """A robot in its scene: see `motors_and_sensors.Body`.
 
     Attributes:
@@ -82,10 +82,9 @@ class MujocoBody:
             start: pose `(3,)`: x, y [m], yaw [rad].
             now: the time [s].
         """
-        self._scene = scene
-        self._data = mujoco.MjData(scene.model)
-        self._data.qpos[:] = scene.qpos(start)
-        mujoco.mj_step1(scene.model, self._data)
+        # a physics step is all of its control step
+        self._robots = robots_in(replace(scene, n_substeps=1), 1, 1)
+        self._reading = self._robots.reset(start[None])
         self._timestep = scene.model.opt.timestep
         self._origin = self._now = now
         self._n_steps = 0
@@ -130,7 +129,7 @@ class MujocoBody:
 
     def proximity(self) -> np.ndarray:
         """See Body."""
-        counts = np.rint(proximity(self._reading().distance)).astype(int)
+        counts = np.rint(proximity(self._reading.distance[0])).astype(int)
         counts = np.minimum(counts, PROXIMITY_COUNT_MAX)
         self.journal.sample_step.append(self._n_steps)
         self.journal.sample.append(counts)
@@ -159,16 +158,11 @@ class MujocoBody:
         # a wheel that waits for part of the step is slower in all of it
         turned = rates * (self._timestep - held)
         self._turned += turned
-        self._data.ctrl[self._scene.wheels] = turned / self._timestep * STEP_ANGLE
-        # what is sensed is refreshed after the step
-        mujoco.mj_step2(self._scene.model, self._data)
-        mujoco.mj_step1(self._scene.model, self._data)
+        speeds = turned / self._timestep * STEP_ANGLE
+        self._reading = self._robots.step(speeds[None])
         self._n_steps += 1
         self._note()
 
     def _note(self) -> None:
-        self.journal.pose.append(self._scene.poses(self._data.qpos))
-        self.journal.contact.append(bool(self._reading().contact))
-
-    def _reading(self) -> Reading:
-        return self._scene.reading(self._data.sensordata)
+        self.journal.pose.append(self._robots.poses()[0])
+        self.journal.contact.append(bool(self._reading.contact[0]))
