@@ -24,6 +24,7 @@ test: $(INSTALLED)
 
 bench: $(INSTALLED)
 	$(BIN)/python -m benchmarks.throughput --json results/throughput.json
+	$(BIN)/python -m benchmarks.whole_run --json results/whole_run.json
 
 # how much truth each robot tells: about an hour on two cores; it goes on where it was
 ladder: $(INSTALLED)

@@ -1,0 +1,131 @@
+"""What the seconds of a run are spent on: `python -m benchmarks.whole_run`.
+
+Runs an experiment with each seed, as `python -m evolution.run` does, and takes the time
+of its parts by the clock and by the CPU. It also lists what became of the champions.
+"""
+
+import itertools
+import json
+import resource
+import statistics
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from epuck_mj.host import files
+from epuck_mj.host.command_line import main, parse
+from epuck_mj.scene.model_files import WHEELED_ROBOT
+from evolution.run.directory import RunDirectory
+from evolution.run.execution import Run
+from evolution.run.means import Means
+from evolution.settings.config_files import find_config, load_config
+from evolution.study.config import parse_seeds
+
+LOADING, CHEAP, WHEELS = "loading", "evolving, before the climb", "evolving on wheels"
+
+
+@dataclass(frozen=True)
+class Options:
+    """Time the parts of runs.
+
+    Attributes:
+        experiment: a shipped experiment or a YAML file.
+        seeds: as 1-5 or 1,3.
+        climb: share of the evaluations before the climb; the experiment's if not given.
+        threads: threads that step the robots; 0 is one per core.
+        json: also write everything to this file.
+    """
+
+    experiment: tyro.conf.Positional[str] = "de-best"
+    seeds: str = "1-10"
+    climb: float | None = None
+    threads: int = 0
+    json: Path | None = None
+
+
+class Clock:
+    """Seconds of each part, by the clock and by the CPU."""
+
+    def __init__(self) -> None:
+        """Begin the first part."""
+        self.parts: dict[str, list[float]] = {}
+        self._part = LOADING
+        self._before = time.perf_counter(), time.process_time()
+
+    def begin(self, part: str) -> None:
+        """End a part and begin the next."""
+        now = time.perf_counter(), time.process_time()
+        spent = self.parts.setdefault(self._part, [0.0, 0.0])
+        for i in range(2):
+            spent[i] += now[i] - self._before[i]
+        self._part, self._before = part, now
+
+
+def timed(options: Options, seed: int, folder: Path) -> dict:
+    """One run, with its parts' seconds and its champion's scores on wheels."""
+    clock = Clock()
+    update: dict = {"seed": seed}
+    if options.climb is not None:
+        update["climb"] = options.climb
+    config = load_config(find_config(options.experiment)).model_copy(update=update)
+    run = Run(
+        config, RunDirectory(folder / str(seed)), Means(threads=options.threads), []
+    )
+    run.start()
+    clock.begin(CHEAP)
+    for record in run.evolve():
+        if record.climbed:
+            clock.begin(WHEELS)
+    scores = run.finish(lambda text, _number, _stages: clock.begin(text))
+    clock.begin("")
+    test = scores.held_out[WHEELED_ROBOT]
+    return {
+        "seed": seed,
+        "seconds": clock.parts,
+        "mean": test.mean,
+        "crash_rate": test.crash_rate,
+    }
+
+
+def whole_runs(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status."""
+    options = parse(Options, "python -m benchmarks.whole_run", argv, Options())
+    runs = []
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in parse_seeds(options.seeds):
+            runs.append(timed(options, seed, Path(folder)))
+            clock, cpu = (
+                sum(part[i] for part in runs[-1]["seconds"].values()) for i in range(2)
+            )
+            print(
+                f"seed {seed}: {runs[-1]['mean']:.1f} of 300 on wheels, "
+                f"{runs[-1]['crash_rate']:.1%} crashed, {clock:.0f} s, {cpu:.0f} CPU-s",
+                flush=True,
+            )
+    parts = dict.fromkeys(itertools.chain(*(run["seconds"] for run in runs)))
+    medians = {
+        part: [
+            statistics.median(run["seconds"].get(part, [0, 0])[i] for run in runs)
+            for i in range(2)
+        ]
+        for part in parts
+    }
+    print("\nmedian seconds by the clock, and by the CPU")
+    for part, (clock, cpu) in medians.items():
+        print(f"{clock:8.2f} {cpu:8.2f}  {part}")
+    means = [run["mean"] for run in runs]
+    megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"\nmedian {statistics.median(means):.1f} of 300; {megabytes:.0f} MB")
+    if options.json is not None:
+        found = {"medians": medians, "megabytes": megabytes, "runs": runs}
+        with files.writing():
+            files.write_text(options.json, json.dumps(found, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    main(whole_runs)
