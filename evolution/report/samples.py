@@ -76,7 +76,7 @@ def like_for_like(data: StudyData, name: str) -> np.ndarray:
 def most_believed_fitness(data: StudyData, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Stored and held-out fitness of each run's most believed individual, `(n,)`.
 
-    Held-out on the robot evolved on; of the runs that say. None say of experiments with
+    Held-out on the robot that comes first; of the runs that say. None say of experiments with
     noise: theirs was tested on ideal robots only.
     """
     if with_noise(data, name):

@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from epuck_mj.host.own_parts import is_own
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.judging.evaluation import evaluate
-from evolution.judging.held_out import Judges
+from evolution.judging.held_out import Judge, Judges
 from evolution.run.champion import Stored, stored_by
 from evolution.run.generation_loop import Evolution
 from evolution.run.history import CLIMBED, HISTORY, Record, csv_columns, timing_text
@@ -55,7 +56,7 @@ def compared(written: Written, judges: Judges, threads: int) -> Outcome:
     else:
         lines += _histories(written, evolution)
         stored = stored_without_checkpoint(written, evolution)
-    tested = judges.tested_on(evolution.config.robot, evolution.config.setting)
+    tested = _judges(written, judges)
     controller, _ = judged(evolution, stored, tested, threads)
     now, name = json.loads(controller.to_json()), written.run.champion.name
     known = said(now, written.champion)
@@ -67,6 +68,14 @@ def compared(written: Written, judges: Judges, threads: int) -> Outcome:
         lines += lines_of_differences(name, before, _arrays(shown))
     # the first generations are compared twice
     return Outcome(tuple(dict.fromkeys(lines)), tuple(unsaid(now, written.champion)))
+
+
+def _judges(written: Written, judges: Judges) -> Mapping[str, Judge]:
+    """Judges of the robots that the champion was tested on: once these were others."""
+    config = written.source
+    paths = {Path(config.robot).name: config.robot}
+    names = written.champion["scores"]["held_out"]
+    return {name: judges.of(paths.get(name, name), config.setting) for name in names}
 
 
 def _made_of(written: Written, evolution: Evolution) -> Iterator[str]:
