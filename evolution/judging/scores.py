@@ -156,7 +156,8 @@ class Scores(_Record, frozen=True):
     @property
     def in_short(self) -> str:
         """Part of a line with held-out fitness on each robot and stored fitness."""
-        return f"held-out {_in_words(_wheels_first(self.held_out))}; stored {self.stored:.1f}"
+        tests = _in_words(_wheels_first(self.held_out))
+        return f"held-out {tests}; stored {self.stored:.1f}"
 
 
 def _wheels_first(tests: Mapping[str, HeldOut]) -> dict[str, HeldOut]:

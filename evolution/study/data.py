@@ -185,7 +185,7 @@ def _run(
     seed: int,
     tested: tuple[str, ...],
 ) -> RunData:
-    """A finished run, tested on the same robots as those before; `tested` is () at first.
+    """A finished run; `tested` are the robots that those before were tested on.
 
     Raises:
         UserError: if it is not finished, damaged, or of another config.

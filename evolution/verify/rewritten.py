@@ -73,9 +73,9 @@ def compared(written: Written, judges: Judges, threads: int) -> Outcome:
 def _judges(written: Written, judges: Judges) -> Mapping[str, Judge]:
     """Judges of the robots that the champion was tested on: once these were others."""
     config = written.source
-    paths = {Path(config.robot).name: config.robot}
-    names = written.champion["scores"]["held_out"]
-    return {name: judges.of(paths.get(name, name), config.setting) for name in names}
+    names: list[str] = list(written.champion["scores"]["held_out"])
+    robots = {name: name for name in names} | {Path(config.robot).name: config.robot}
+    return {name: judges.of(robots[name], config.setting) for name in names}
 
 
 def _made_of(written: Written, evolution: Evolution) -> Iterator[str]:

@@ -17,6 +17,7 @@ from epuck_mj.host.command_line import main, parse, word
 from epuck_mj.host.files import check_writable
 from epuck_mj.host.interruption import Interrupted, Interruption
 from epuck_mj.host.output import Output
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 
 MODULE = "epuck_mj.bridge.fake"
 RANDOM = "random"
@@ -118,6 +119,11 @@ def fake(argv: Sequence[str]) -> int:
 
 def _refuse_bad_options(options: Options) -> None:
     ports = [x for x in (options.link, options.tcp, options.wifi) if x is not None]
+    if options.robot == KINEMATIC_ROBOT:
+        raise UserError(
+            f"the emulated robot moves in MuJoCo: expected --robot {WHEELED_ROBOT}, "
+            f"got {KINEMATIC_ROBOT}"
+        )
     if len(ports) > 1:
         raise UserError("expected one of --link, --tcp and --wifi")
     if options.journal is not None:
