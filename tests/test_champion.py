@@ -3,13 +3,16 @@
 import math
 import statistics
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from epuck_mj.host import files
 from epuck_mj.policies.file import Origin, load_controller
+from epuck_mj.rungs.simulator import Simulator
 from epuck_mj.rungs.table import robots_in
+from epuck_mj.scene.model import Scene
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.show import figures, pictures, recording
 from epuck_mj.step.control import control_step
@@ -74,11 +77,17 @@ def finished(request):
     return experiment, generations
 
 
+@cache
+def one_robot(scene: Scene) -> Simulator:
+    """A robot in a scene, made once."""
+    return robots_in(scene, 1, 1)
+
+
 def slow_trial(experiment: Evolution, genome, start) -> tuple[float, bool]:
     """Fitness of a genome's trial on one start, alone, and whether it crashed."""
     task = experiment.config.task
     policy = experiment.config.topology.decode(genome)
-    robots = robots_in(experiment.scene, 1, 1)
+    robots = one_robot(experiment.scene)
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     fitness = 0.0
     for k in range(task.steps):

@@ -349,7 +349,7 @@ def test_a_worker_of_other_versions_refuses(split, fleet, tmp_path, monkeypatch)
 
 
 def test_a_worker_of_other_code_refuses(monkeypatch):
-    asked = requirements.Requirements.here("epuck_planar", "arena", 0.1)
+    asked = requirements.Requirements.here("epuck_kinematic", "arena", 0.1)
     assert ("code of epuck-mj", requirements.code()) in asked.facts
     monkeypatch.setattr(requirements, "code", lambda: "edited")
     monkeypatch.setattr(requirements, "get_worker", lambda: SimpleNamespace(address=7))

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from epuck_mj.errors import UserError
+from epuck_mj.rungs.simulator import Simulator
 from epuck_mj.rungs.table import robots_in
+from epuck_mj.scene.model import Scene
 from epuck_mj.step.control import TaskParameters, control_step
 from epuck_mj.step.sensors import observe
 from evolution.judging.held_out_starts import starts_for_test, starts_for_validation
@@ -134,9 +136,15 @@ def test_streams_depend_on_each_part_of_their_key():
 # records
 
 
+@cache
+def one_robot(scene: Scene) -> Simulator:
+    """A robot in a scene, made once."""
+    return robots_in(scene, 1, 1)
+
+
 def slow_trial(scene, policy, start, task: TaskParameters) -> tuple[float, int, bool]:
     """Fitness of one robot's trial, the steps it lived and whether it crashed."""
-    robots = robots_in(scene, 1, 1)
+    robots = one_robot(scene)
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     fitness = 0.0
     for i in range(task.steps):
