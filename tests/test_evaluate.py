@@ -194,7 +194,7 @@ def test_a_robot_that_was_measured(tmp_path):
         "track": calibration.track,
     }
     for wrong, message in {
-        (str(finished), *own): "calibration needs noise: calibrated or strong, got",
+        ("wall-follower", *own): "calibration needs noise: calibrated or strong, got",
         (*options, *own, "--randomise"): "expected randomise or calibration, got both",
         (*options, "--json", str(tmp_path)): "cannot write .* it is a folder",
         (*options, "--json", "no/out.json"): "cannot write .*no folder 'no'",

@@ -138,8 +138,11 @@ def _histories(written: Written, evolution: Evolution) -> Iterator[str]:
     # an own optimiser's generations may differ in size
     own = is_own(config.optimizer.algorithm)
     left = config.evaluations - spent
+    climbed = bool(written.history[CLIMBED].any())
     # to climb, the population would have been evaluated anew
-    needed = evolution.optimizer.next_size() * (2 if config.climbs else 1)
+    due = config.climbs and spent >= config.climb * config.evaluations
+    climbs = due and not climbed
+    needed = evolution.optimizer.next_size() * (2 if climbs else 1)
     if left < 0 or not (own or left < needed):
         yield (
             f"{written.run.config.name}: evaluations {config.evaluations}, but "
