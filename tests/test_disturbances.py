@@ -10,6 +10,7 @@ from epuck_mj.constants import STEP_RATE_MAX, TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.policies.network import Network
 from epuck_mj.rungs.disturbed import DisturbedRobots
+from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.rungs.table import RUNGS, robots_in
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.robot_parts import ROBOT_BODY
@@ -173,7 +174,7 @@ def test_readings_have_an_age(scene):
 
 def test_bodies_are_heavier_and_slide():
     scene = load_scene("epuck", "arena", TASK.control_step)
-    robots = robots_in(scene, 2, 1)
+    robots = MujocoRobots(scene, 2, 1)
     robots.embody(np.array([1.0, 2.0]), np.array([1.0, 0.5]))
     model = scene.model
     body, wheel = model.body(ROBOT_BODY).id, model.geom("epuck/wheel_left").id

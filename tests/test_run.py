@@ -909,6 +909,24 @@ def test_an_arena_that_the_wheeled_robot_cannot_use_is_refused_first(refusal, he
     assert "no floor for the robot's wheels" in message
 
 
+def test_an_arena_that_the_kinematic_robot_cannot_use_is_refused_first(
+    refusal, here, no_pictures, capfd
+):
+    leaning = '<geom name="mast" type="cylinder" size=".02 .1" euler="20 0 0"/>'
+    text = (MODELS / "arena.xml").read_text()
+    (here / "mine.xml").write_text(
+        text.replace("</worldbody>", f"{leaning}</worldbody>")
+    )
+    argv = ["ga", *SHORT, "--arena", "mine.xml", "--output", "out"]
+    message = refusal(*argv)
+    assert "geom 'mast' has no exact outline in a plan: " in message
+    assert message.endswith("; --robot epuck simulates it")
+    assert not (here / "out").exists()
+    assert evolve([*argv, "--robot", "epuck"]) == 0
+    assert capfd.readouterr().err.count("not tested on epuck_kinematic: ") == 1
+    assert list(load_controller("out/champion.json").scores["held_out"]) == ["epuck"]
+
+
 def test_a_checkpoint_of_another_seed_is_refused(
     refusal, unfinished, no_pictures, capfd
 ):
