@@ -34,7 +34,8 @@ pytestmark = pytest.mark.slow
 
 
 FEW = {"validation_starts": 10, "test_starts": 10}
-SMALL = {"steps": 20, "trials": 2, "evaluations": 100} | FEW
+# trials that are worth sending: on the kinematic robot they are run here
+SMALL = {"robot": "epuck", "steps": 20, "trials": 2, "evaluations": 100} | FEW
 LONG = SMALL | {"evaluations": 300}
 ENDLESS = SMALL | {"evaluations": 1_000_000}
 

@@ -254,7 +254,7 @@ def test_stored_and_held_out_shows_every_run_in_order_of_stored_fitness(data):
         order = np.argsort(data.stored(name))
         stored, *tests = dots(axes)
         np.testing.assert_array_equal(stored[:, 1], data.stored(name)[order])
-        for test, robot in zip(tests, ROBOTS, strict=True):
+        for test, robot in zip(tests, reversed(ROBOTS), strict=True):
             np.testing.assert_array_equal(test[:, 0], stored[:, 0])
             np.testing.assert_array_equal(test[:, 1], data.held_out(name, robot)[order])
         (luck,) = collections(axes, LineCollection)
@@ -303,8 +303,8 @@ def test_rungs_shows_wheels_against_the_robot_that_evolution_began_on(data):
 def test_behaviour_shows_mean_shares(data):
     run = data.runs["ga"][0]
     tests = {
-        "epuck_kinematic": a_test(1.0, {"crashed": 1.0}),
-        "epuck": a_test(1.0, {"stuck": 1.0}),
+        "epuck": a_test(1.0, {"crashed": 1.0}),
+        "epuck_kinematic": a_test(1.0, {"stuck": 1.0}),
     }
     other = replace(run, scores=Scores(stored=1.0, held_out=tests))
     runs = {**data.runs, "ga": (run, other)}

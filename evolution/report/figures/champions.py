@@ -161,7 +161,7 @@ def _draw_luck(axes: Axes, data: StudyData, name: str, look: Look) -> None:
     low, high = everything.min(axis=0), everything.max(axis=0)
     axes.vlines(rank, low, high, color=look.color, lw=0.9, zorder=2)
     axes.scatter(rank, stored, marker="_", s=40, color="black", lw=1.6, zorder=4)
-    # the robot evolved on is filled, and in front
+    # the robot that is reported is filled, and in front
     for i, test in reversed(list(enumerate(tests))):
         axes.scatter(rank, test, **_dots(look, filled=i == 0, area=LUCK_AREA))
     axes.set(xticks=[], xlim=(-1, order.size))
