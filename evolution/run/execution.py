@@ -112,6 +112,7 @@ class Run:
         Raises:
             UserError: if it cannot be written.
         """
+        self.evolution.release()
         with writing():
             scores = write_results(
                 self.evolution, self._judges, self.directory, stage, self._threads
