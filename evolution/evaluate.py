@@ -1,6 +1,7 @@
 """Held-out evaluation: `python -m evolution.evaluate PATH... [options]`."""
 
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cache
@@ -47,7 +48,7 @@ class Options:
             champions: numbers from 0 on, or last, separated by commas.
         starts: number of test starts; always the first of the same sequence.
         robot: robot to test on; if not given, the robot that the champion evolved on
-            and the other shipped robot.
+            and epuck, or epuck and epuck_kinematic.
         arena: arena to test in; if not given, the one that the champion evolved in.
         robots: noise and differences of the robots; ideal robots if not given.
         threads: threads that step the robots; 0 is one per core. Changes no result.
@@ -89,6 +90,10 @@ def evaluate_policies(argv: Sequence[str]) -> int:
         arena = options.arena or candidate.arena
         setting = Setting(arena, candidate.task, candidate.start_clearance)
         for robot in robots:
+            refusal = None if options.robot else judges.refusal(robot, setting)
+            if refusal is not None:
+                print(f"{candidate.name}: {refusal}", file=sys.stderr)
+                continue
             steps = candidate.task.steps
             test = judges.of(robot, setting).test(
                 candidate.policy, options.starts, met(steps)

@@ -14,6 +14,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import START_CLEARANCE, Policy, TaskParameters
 from evolution.judging.scores import KnownScores
@@ -46,7 +47,7 @@ class NamedPolicy:
     source: str
     policy: Policy
     task: TaskParameters
-    robot: str = "epuck_planar"
+    robot: str = KINEMATIC_ROBOT
     arena: str = "arena"
     start_clearance: float = START_CLEARANCE
     scores: KnownScores = field(default_factory=KnownScores)

@@ -1,4 +1,4 @@
-"""Shared by all tests: both shipped robots in the paper's arena."""
+"""Shared by all tests: the shipped robots in the paper's arena."""
 
 import os
 import signal
@@ -11,12 +11,12 @@ os.environ["RERUN_STRICT"] = "1"
 import pytest
 
 from epuck_mj.host.interruption import SIGNALS
+from epuck_mj.rungs.mujoco_batch import MujocoRobots
+from epuck_mj.rungs.table import RUNGS
 from epuck_mj.scene.model import Scene, load_scene
 
 # ignored where tests run in the background of a script, and by all that they start
 signal.signal(signal.SIGINT, signal.default_int_handler)
-
-ROBOTS = ("epuck", "epuck_planar")
 
 
 @pytest.fixture
@@ -40,15 +40,24 @@ def alone(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.fixture(scope="session", params=ROBOTS)
+@pytest.fixture(scope="session", params=RUNGS)
 def scene(request) -> Scene:
     """Each shipped robot, in turn."""
     return load_scene(request.param, "arena")
 
 
+@pytest.fixture(
+    scope="session",
+    params=[name for name, maker in RUNGS.items() if maker is MujocoRobots],
+)
+def mujoco_scene(request) -> Scene:
+    """Each shipped robot that MuJoCo moves, in turn."""
+    return load_scene(request.param, "arena")
+
+
 @pytest.fixture(scope="session")
 def planar() -> Scene:
-    """The cheaper one of the two."""
+    """The cheaper one of the two that MuJoCo moves."""
     return load_scene("epuck_planar", "arena")
 
 

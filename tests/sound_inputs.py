@@ -26,7 +26,7 @@ FINISHED = "finished/mine/seed-1"
 KEYS = {
     "seed": 1,
     "evaluations": 8,
-    "robot": "epuck_planar",
+    "robot": "epuck_kinematic",
     "arena": "arena",
     "trials": 1,
     "steps": 3,
@@ -43,7 +43,7 @@ KEYS = {
     "optimizer": {"algorithm": "genetic_algorithm", "population": 4, "bits": 8},
 }
 TEST = {"mean": 1.5, "crash_rate": 0.5, "starts": 2}
-SCORES = {"stored": 2.5, "validation": 1.5, "held_out": {"epuck_planar": TEST}}
+SCORES = {"stored": 2.5, "validation": 1.5, "held_out": {"epuck_kinematic": TEST}}
 
 ARENA = """<mujoco model="mine">
   <option timestep="0.01" integrator="implicitfast"/>
@@ -74,7 +74,7 @@ def write_sound_inputs() -> None:
         evolution.start()
         assert list(evolution.evolve())
     genome = np.random.default_rng(0).uniform(-5, 5, Network().n_genes)
-    origin, task = Origin("epuck_planar", "arena", 0.01), TaskParameters(steps=3)
+    origin, task = Origin("epuck_kinematic", "arena", 0.01), TaskParameters(steps=3)
     champion = ControllerFile(Network(), genome, task, origin, SCORES)
     for path in (run.champion, Path("champion.json")):
         path.write_text(champion.to_json())

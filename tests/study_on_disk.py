@@ -14,12 +14,12 @@ from evolution.settings.config_files import find_config, load_config
 from evolution.study.config import StudyConfig
 from evolution.study.directory import StudyDirectory
 
-ROBOTS = ("epuck_planar", "epuck")
+ROBOTS = ("epuck", "epuck_kinematic")
 LEVELS = {"de-best": 220.0, "de-rand": 180.0, "ga": 120.0}
 POPULATIONS = {"de-best": 150, "de-rand": 120, "ga": 100}
 EVALUATIONS = 3000
 STEPS = 300
-ORIGIN = Origin("epuck_planar", "arena")
+ORIGIN = Origin("epuck_kinematic", "arena")
 
 
 def held_out(mean: float, rng: np.random.Generator) -> dict:
@@ -100,14 +100,14 @@ def _write_run(
         "generation,seconds,control_steps,crash_rate\n"
         "0,1.5,1000,0.1\n1,1.5,900,0.1\n1,1.4,900,0.1\n"
     )
-    planar = float(LEVELS[name] - rng.uniform(5, 50))
+    wheels = float(LEVELS[name] - rng.uniform(5, 50))
     scores = {
         "stored": float(rows[:, 2].max()),
-        "validation": planar + 1,
-        "most_believed": {"stored": float(rows[:, 2].max()), "held_out": planar - 9},
+        "validation": wheels + 1,
+        "most_believed": {"stored": float(rows[:, 2].max()), "held_out": wheels - 9},
         "held_out": {
-            "epuck_planar": held_out(planar, rng),
-            "epuck": held_out(planar - float(rng.uniform(0, 10)), rng),
+            "epuck": held_out(wheels, rng),
+            "epuck_kinematic": held_out(wheels + float(rng.uniform(0, 10)), rng),
         },
     }
     genome = rng.uniform(-5, 5, Network().n_genes)

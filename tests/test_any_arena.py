@@ -10,7 +10,7 @@ import pytest
 from epuck_mj.check.arena import check_arena
 from epuck_mj.errors import UserError
 from epuck_mj.policies.wall_follower import WallFollower
-from epuck_mj.rungs.table import robots_in
+from epuck_mj.rungs.table import RUNGS, robots_in
 from epuck_mj.rungs.watched_robot import WatchedRobot
 from epuck_mj.scene.geometry import walls
 from epuck_mj.scene.model import load_scene
@@ -20,8 +20,6 @@ from epuck_mj.scene.sameness import check_same
 from epuck_mj.scene.starts import survey
 from epuck_mj.step.control import TaskParameters, drive
 from evolution.judging.evaluation import DmControlEngine, Work
-
-ROBOTS = ("epuck", "epuck_planar")
 
 PLAIN = """<mujoco>
   <worldbody>
@@ -81,7 +79,7 @@ GLOBALS = {
 }
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", RUNGS)
 def test_nothing_global_reaches_the_robot(tmp_path, robot):
     plain = tmp_path / "plain.xml"
     plain.write_text(PLAIN)
@@ -94,7 +92,7 @@ def test_nothing_global_reaches_the_robot(tmp_path, robot):
         np.testing.assert_array_equal(driven(robot, arena), expected, name)
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", RUNGS)
 @pytest.mark.parametrize("height", [-0.02, 0.012, 0.02])
 def test_robots_stand_on_the_floor_that_is_there(tmp_path, robot, height):
     arena = tmp_path / "arena.xml"

@@ -9,6 +9,7 @@ import pytest
 from scipy import spatial
 
 from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.rungs.table import RUNGS
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import MODELS
@@ -17,7 +18,6 @@ from epuck_mj.step.control import START_CLEARANCE, TaskParameters
 from evolution.judging.held_out import Judge
 
 ARENAS = sorted(MODELS.glob("arenas/*.xml"))
-ROBOTS = ("epuck_planar", "epuck")
 
 arenas = pytest.mark.parametrize("path", ARENAS, ids=lambda path: path.stem)
 
@@ -52,14 +52,14 @@ def test_it_holds_walls_and_nothing_else(path: Path):
 def test_mujoco_and_every_robot_load_it(path: Path):
     model = mujoco.MjModel.from_xml_path(str(path))
     assert model.opt.timestep == 0.01
-    for robot in ROBOTS:
+    for robot in RUNGS:
         scene = load_scene(robot, path.stem)
         assert scene.arena == path
         assert set(scene.sha256) == {"arena", "robot", "../stage.xml"}
 
 
 @arenas
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", RUNGS)
 def test_starts_touch_nothing_and_reach_all_of_the_free_space(path: Path, robot: str):
     scene = load_scene(robot, path.stem)
     space = FreeSpace(scene, START_CLEARANCE)
@@ -76,7 +76,7 @@ def test_starts_touch_nothing_and_reach_all_of_the_free_space(path: Path, robot:
 
 @arenas
 def test_the_hand_written_follower_follows_its_walls(path: Path):
-    scene = load_scene("epuck_planar", path.stem)
+    scene = load_scene("epuck_kinematic", path.stem)
     judge = Judge(scene, FreeSpace(scene, START_CLEARANCE), TaskParameters(), 1)
     test = judge.test(WallFollower(), 20)
     assert test.behaviour["wall follower"] + test.behaviour["hugger"] >= 0.75

@@ -3,18 +3,23 @@
 import math
 import statistics
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from epuck_mj.host import files
 from epuck_mj.policies.file import Origin, load_controller
-from epuck_mj.rungs.mujoco_batch import MujocoRobots
+from epuck_mj.rungs.simulator import Simulator
+from epuck_mj.rungs.table import robots_in
+from epuck_mj.scene.model import Scene
+from epuck_mj.scene.model_files import MODELS
 from epuck_mj.show import figures, pictures, recording
 from epuck_mj.step.control import control_step
 from epuck_mj.step.sensors import observe
 from epuck_mj.trials.recorder import record
 from epuck_mj.trials.trajectory import Trajectory
+from evolution.judging.evaluation import BatchEngine
 from evolution.judging.held_out import Judge, Judges
 from evolution.judging.held_out_starts import (
     held_out_disturbances,
@@ -22,9 +27,11 @@ from evolution.judging.held_out_starts import (
     starts_for_validation,
 )
 from evolution.judging.scores import Believed, Scores
+from evolution.run import champion as champion_choice
 from evolution.run import results
 from evolution.run.champion import (
     LATEST_BEST,
+    Champion,
     candidates,
     choose_champion,
     most_believed,
@@ -40,6 +47,11 @@ from evolution.settings.randomness import Purpose
 from tests.no_pictures import draw_nothing
 
 SHIPPED = ("de-best", "de-rand", "ga")
+ROUND_WALL, LEANING_WALL = (
+    f'<geom type="cylinder" size=".02 .1" pos=".2 .2 .05" euler="{lean} 0 0"/>'
+    "</worldbody>"
+    for lean in (0, 20)
+)
 
 
 def tiny(name: str, population: int = 20, **update) -> ExperimentConfig:
@@ -65,11 +77,17 @@ def finished(request):
     return experiment, generations
 
 
+@cache
+def one_robot(scene: Scene) -> Simulator:
+    """A robot in a scene, made once."""
+    return robots_in(scene, 1, 1)
+
+
 def slow_trial(experiment: Evolution, genome, start) -> tuple[float, bool]:
     """Fitness of a genome's trial on one start, alone, and whether it crashed."""
     task = experiment.config.task
     policy = experiment.config.topology.decode(genome)
-    robots = MujocoRobots(experiment.scene, 1, 1)
+    robots = one_robot(experiment.scene)
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     fitness = 0.0
     for k in range(task.steps):
@@ -159,10 +177,11 @@ def test_the_tenth_is_rounded_and_at_least_one(population, n):
 # the choice
 
 
-def test_the_champion_is_best_on_the_validation_starts(finished):
+def test_the_champion_is_best_on_the_validation_starts(finished, monkeypatch):
+    monkeypatch.setattr(champion_choice, "N_SCREENING", 12)
     experiment, _ = finished
     starts = starts_for_validation(experiment.space, 12)
-    genomes, stored = candidates(stored_by(experiment))
+    genomes, stored = candidates(stored_by(experiment), share=1.0)
     means = [
         np.mean([slow_trial(experiment, genome, start)[0] for start in starts])
         for genome in genomes
@@ -177,7 +196,7 @@ def test_the_champion_is_best_on_the_validation_starts(finished):
 
 def test_stored_fitness_does_not_choose_the_champion():
     """A lucky draw is a candidate, and loses to who is better on fresh starts."""
-    experiment = Evolution(tiny("ga", steps=10))
+    experiment = Evolution(tiny("ga", robot="epuck", steps=10))
     genes = experiment.config.topology.n_genes
     # fast and straight ahead; standing still
     fast, still = np.zeros(genes), np.zeros(genes)
@@ -221,6 +240,14 @@ def test_held_out_against_a_slow_loop(finished):
     assert report.standard_deviation > 0
 
 
+def champion_of(experiment: Evolution) -> Champion:
+    """The champion, chosen as a run does."""
+    wheels = BatchEngine(
+        judges_of(experiment.config)["epuck"].scene, experiment.config.task, 1
+    )
+    return choose_champion(experiment.engine, experiment, stored_by(experiment), wheels)
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """Results of a run, without the pictures."""
@@ -235,7 +262,7 @@ def written(tmp_path_factory):
 
 def test_the_champion_file_loads_and_acts_bit_for_bit(written):
     experiment, directory = written
-    champion = choose_champion(experiment.engine, experiment, stored_by(experiment))
+    champion = champion_of(experiment)
     stored = load_controller(directory.champion)
     assert stored.genome.tobytes() == champion.genome.tobytes()
     assert stored.network == experiment.config.topology
@@ -249,17 +276,17 @@ def test_the_champion_file_loads_and_acts_bit_for_bit(written):
 
 def test_the_champion_file_holds_every_score(written):
     experiment, directory = written
-    champion = choose_champion(experiment.engine, experiment, stored_by(experiment))
+    champion = champion_of(experiment)
     stored = load_controller(directory.champion)
     policy = experiment.config.topology.decode(champion.genome)
     tests = {
         robot: judge.test(policy, 30)
         for robot, judge in judges_of(experiment.config).items()
     }
-    assert list(tests) == ["epuck_planar", "epuck"]
-    # what evolution believed in most, on the robot that it was evolved on
+    assert list(tests) == ["epuck", "epuck_kinematic"]
+    # what evolution believed in most, on wheels
     genome, believed = most_believed(stored_by(experiment))
-    judge = judges_of(experiment.config)["epuck_planar"]
+    judge = judges_of(experiment.config)["epuck"]
     worth = judge.test(experiment.config.topology.decode(genome), 30)
     assert Scores.read(stored.scores, directory.champion) == Scores(
         stored=champion.stored_fitness,
@@ -270,7 +297,7 @@ def test_the_champion_file_holds_every_score(written):
     assert list(stored.scores) == ["stored", "validation", "held_out", "most_believed"]
     assert stored.task == experiment.config.task
     assert stored.origin == Origin(
-        "epuck_planar", "arena", 0.01, dict(experiment.scene.sha256)
+        "epuck_kinematic", "arena", 0.01, dict(experiment.scene.sha256)
     )
 
 
@@ -293,7 +320,7 @@ def test_a_champion_of_disturbed_robots_is_tested_on_such_as_well(
     stored = load_controller(directory.champion)
     assert Scores.read(stored.scores, directory.champion) == scores
     found = scores.held_out_as_evolved
-    assert list(found) == list(scores.held_out) == ["epuck_planar", "epuck"]
+    assert list(found) == list(scores.held_out) == ["epuck", "epuck_kinematic"]
     # the first of those that anybody draws
     met = held_out_disturbances(config.conditions, Purpose.TEST, 1000, config.steps)
     assert met is not None
@@ -316,15 +343,15 @@ def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
     _, directory = written
     stored = load_controller(directory.champion).scores
     scores = Scores.read(stored, directory.champion)
-    headline, plane, own, *highest = scores.in_lines(20.0).splitlines()
+    headline, cheap, own, *highest = scores.in_lines(20.0).splitlines()
     tests = stored["held_out"]
     mean, crashes = tests["epuck"]["mean"], tests["epuck"]["crash_rate"]
     assert headline == (
         f"The champion earns {mean:.1f} of 20: the mean of 30 fresh starts on epuck; "
         f"{crashes:.0%} of the trials end in a crash"
     )
-    mean, crashes = (tests["epuck_planar"][key] for key in ("mean", "crash_rate"))
-    assert plane == f"On epuck_planar {mean:.1f} ({crashes:.0%} crash)"
+    mean, crashes = (tests["epuck_kinematic"][key] for key in ("mean", "crash_rate"))
+    assert cheap == f"On epuck_kinematic {mean:.1f} ({crashes:.0%} crash)"
     assert own.startswith(f"Evolution stored {stored['stored']:.1f} for it, from the")
     believed = stored["most_believed"]
     assert len(highest) == (believed["stored"] != stored["stored"])
@@ -339,18 +366,30 @@ def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
     assert " of 20" not in scores.in_lines(None)
 
 
-def test_a_run_on_the_wheeled_robot_is_tested_on_the_plane_as_well(
-    tmp_path, monkeypatch
+@pytest.mark.parametrize(
+    ("robot", "arena", "tested"),
+    [
+        ("epuck", ROUND_WALL, ["epuck", "epuck_kinematic"]),
+        # a leaning cylinder has no exact outline
+        ("epuck", LEANING_WALL, ["epuck"]),
+        ("epuck_planar", ROUND_WALL, ["epuck_planar", "epuck"]),
+    ],
+)
+def test_a_run_is_tested_on_wheels_and_on_one_robot_more_that_can_be(
+    robot, arena, tested, tmp_path, monkeypatch
 ):
     draw_nothing(monkeypatch)
-    experiment = Evolution(tiny("ga", robot="epuck", steps=10, evaluations=20))
+    path = tmp_path / "mine.xml"
+    path.write_text((MODELS / "arena.xml").read_text().replace("</worldbody>", arena))
+    settings = {"robot": robot, "arena": str(path), "steps": 10, "evaluations": 20}
+    experiment = Evolution(tiny("ga", **settings))
     list(experiment.run())
     directory = RunDirectory(tmp_path)
     scores = write_results(experiment, judges_of(experiment.config), directory)
-    assert list(scores.held_out) == ["epuck", "epuck_planar"]
+    assert list(scores.held_out) == tested
     written = load_controller(directory.champion)
     assert directory.champion.read_text(encoding="utf-8") == written.to_json()
-    assert len(scores.in_lines(10.0).splitlines()) in (3, 4)
+    assert len(scores.in_lines(10.0).splitlines()) in (1 + len(tested), 2 + len(tested))
 
 
 def test_a_champion_survives_the_checkpoint(finished, tmp_path):

@@ -34,7 +34,8 @@ pytestmark = pytest.mark.slow
 
 
 FEW = {"validation_starts": 10, "test_starts": 10}
-SMALL = {"steps": 20, "trials": 2, "evaluations": 100} | FEW
+# trials that are worth sending: on the kinematic robot they are run here
+SMALL = {"robot": "epuck", "steps": 20, "trials": 2, "evaluations": 100} | FEW
 LONG = SMALL | {"evaluations": 300}
 ENDLESS = SMALL | {"evaluations": 1_000_000}
 
@@ -349,7 +350,7 @@ def test_a_worker_of_other_versions_refuses(split, fleet, tmp_path, monkeypatch)
 
 
 def test_a_worker_of_other_code_refuses(monkeypatch):
-    asked = requirements.Requirements.here("epuck_planar", "arena", 0.1)
+    asked = requirements.Requirements.here("epuck_kinematic", "arena", 0.1)
     assert ("code of epuck-mj", requirements.code()) in asked.facts
     monkeypatch.setattr(requirements, "code", lambda: "edited")
     monkeypatch.setattr(requirements, "get_worker", lambda: SimpleNamespace(address=7))

@@ -80,7 +80,7 @@ every_experiment = pytest.mark.parametrize("name", SHIPPED)
 COMMON = {
     "seed": 1,
     "evaluations": 30_000,
-    "robot": "epuck_planar",
+    "robot": "epuck_kinematic",
     "climb": 0.9,
     "arena": "arena",
     "trials": 5,

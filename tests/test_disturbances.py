@@ -11,6 +11,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.policies.network import Network
 from epuck_mj.rungs.disturbed import DisturbedRobots
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
+from epuck_mj.rungs.table import RUNGS, robots_in
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.robot_parts import ROBOT_BODY
 from epuck_mj.step.calibration import Calibration
@@ -38,7 +39,7 @@ STARTS = np.array([[0.0, 0.0, 0.3], [0.42, 0.1, 1.5], [-0.2, -0.43, 3.0]])
 FULL = wheel_speeds(np.array([STEP_RATE_MAX, STEP_RATE_MAX]))
 
 
-@pytest.fixture(scope="module", params=["epuck", "epuck_planar"])
+@pytest.fixture(scope="module", params=RUNGS)
 def scene(request):
     return load_scene(request.param, "arena", TASK.control_step)
 
@@ -54,7 +55,7 @@ def genomes(n, seed=1):
 
 
 def robots_on(scene, starts, disturbances) -> DisturbedRobots:
-    robots = MujocoRobots(scene, len(starts), 1)
+    robots = robots_in(scene, len(starts), 1)
     return DisturbedRobots(robots, disturbances, TASK.control_step)
 
 
@@ -109,7 +110,7 @@ def test_arrays_that_do_not_belong_together_are_refused():
 
 def test_without_disturbances_a_robot_counts_and_steps_and_that_is_all(scene):
     quiet = drawn(len(STARTS), QUIET, BOOK)
-    robots, ideal = robots_on(scene, STARTS, quiet), MujocoRobots(scene, 3, 1)
+    robots, ideal = robots_on(scene, STARTS, quiet), robots_in(scene, 3, 1)
     seen, true = robots.reset(STARTS), ideal.reset(STARTS)
     np.testing.assert_array_equal(seen.truth, true.distance)
     assert seen.proximity is not None
@@ -189,7 +190,7 @@ def test_bodies_are_heavier_and_slide():
     np.testing.assert_array_equal(mass, [model.body_mass] * 2)
 
 
-@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
+@pytest.mark.parametrize("robot", RUNGS)
 def test_ideal_robots_have_nothing_of_the_disturbed_ones_before_them(robot):
     engine = BatchEngine(load_scene(robot, "arena", TASK.control_step), TASK, 1)
     met, population = drawn(3, ranges=RANGES), genomes(5)

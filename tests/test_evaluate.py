@@ -10,6 +10,7 @@ import pytest
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import read_arrays
 from epuck_mj.policies.file import load_controller
+from epuck_mj.scene.model_files import MODELS
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.calibration import Calibration
 from evolution.evaluate import evaluate_policies
@@ -45,7 +46,9 @@ def test_evaluation_says_what_the_run_said(finished, tmp_path, capsys):
     written = load_controller(finished / "champion.json").scores["held_out"]
     tests = json.loads(out.read_text())
     assert (
-        [test["robot"] for test in tests] == list(written) == ["epuck_planar", "epuck"]
+        [test["robot"] for test in tests]
+        == list(written)
+        == ["epuck", "epuck_kinematic"]
     )
     for test in tests:
         assert test.items() >= written[test["robot"]].items()
@@ -58,10 +61,12 @@ def test_a_study_a_run_and_a_file_lead_to_the_same_champion(finished, capsys):
     study = finished.parent.parent
     for path in (study, finished, finished / "champion.json"):
         assert (
-            evaluate_policies([str(path), "--starts", "5", "--robot", "epuck_planar"])
+            evaluate_policies(
+                [str(path), "--starts", "5", "--robot", "epuck_kinematic"]
+            )
             == 0
         )
-    blocks = capsys.readouterr().out.split("epuck_planar in arena\n")
+    blocks = capsys.readouterr().out.split("epuck_kinematic in arena\n")
     outcomes = [re.sub(r"\n\S.*", "", block, flags=re.S) for block in blocks[1:]]
     assert len(outcomes) == 3
     assert len({outcome.strip() for outcome in outcomes}) == 1
@@ -69,23 +74,23 @@ def test_a_study_a_run_and_a_file_lead_to_the_same_champion(finished, capsys):
 
 def test_generations_are_tested_one_by_one(finished, tmp_path, capsys):
     out = tmp_path / "out.json"
-    few = ["--starts", "20", "--robot", "epuck_planar", "--json", str(out)]
+    few = ["--starts", "20", "--robot", "epuck_kinematic", "--json", str(out)]
     assert evaluate_policies([str(finished), "--generations", "0,last", *few]) == 0
     tests = json.loads(out.read_text())
     names = [f"{finished} generation 0", f"{finished} generation 1"]
     assert [test["name"] for test in tests] == names
     said = capsys.readouterr().out
-    assert all(f"{name}, epuck_planar in arena\n" in said for name in names)
+    assert all(f"{name}, epuck_kinematic in arena\n" in said for name in names)
     # each is what anybody finds for its genome
     config = load_config(finished / "config.yaml")
-    judge = Judges().of("epuck_planar", config.setting)
+    judge = Judges().of("epuck_kinematic", config.setting)
     genomes = read_arrays(finished / "best_individuals.npz")["genomes"]
     for genome, test in zip(genomes, tests, strict=True):
         assert judge.test(config.topology.decode(genome), 20).mean == test["mean"]
 
 
 def test_the_hand_written_follower_follows(capsys):
-    arguments = ["wall-follower", "--starts", "10", "--robot", "epuck_planar"]
+    arguments = ["wall-follower", "--starts", "10", "--robot", "epuck_kinematic"]
     assert evaluate_policies(arguments) == 0
     assert "behaviour: wall follower 100.0%" in capsys.readouterr().out
 
@@ -101,10 +106,31 @@ def test_another_arena(finished, tmp_path, capsys):
             (0, -0.3, 0.3, 0.01),
         ]
     )
-    arena.write_text(f"<mujoco><worldbody>{walls}</worldbody></mujoco>")
-    arguments = ["--starts", "5", "--arena", str(arena), "--robot", "epuck_planar"]
+    floor = '<geom type="plane" size="1 1 0.1"/>'
+    arena.write_text(f"<mujoco><worldbody>{floor}{walls}</worldbody></mujoco>")
+    arguments = ["--starts", "5", "--arena", str(arena), "--robot", "epuck_kinematic"]
     assert evaluate_policies([str(finished), *arguments]) == 0
-    assert "epuck_planar in small.xml" in capsys.readouterr().out
+    assert "epuck_kinematic in small.xml" in capsys.readouterr().out
+
+
+def test_where_a_wall_has_no_outline_wheels_are_enough(tmp_path, capsys):
+    arena = tmp_path / "leaning.xml"
+    leaning = '<geom name="mast" type="cylinder" size=".02 .1" euler="20 0 0"/>'
+    arena.write_text(
+        (MODELS / "arena.xml")
+        .read_text()
+        .replace("</worldbody>", f"{leaning}</worldbody>")
+    )
+    few = ["wall-follower", "--starts", "5", "--arena", str(arena)]
+    assert evaluate_policies(few) == 0
+    out, err = capsys.readouterr()
+    assert "epuck in leaning.xml" in out
+    assert "epuck_kinematic" not in out
+    assert err.startswith("wall-follower: not tested on epuck_kinematic: arena '")
+    assert "geom 'mast' has no exact outline" in err
+    assert err.count("\n") == 1
+    with pytest.raises(UserError, match=r"'mast' has no .*--robot epuck simulates it$"):
+        evaluate_policies([*few, "--robot", "epuck_kinematic"])
 
 
 @pytest.mark.parametrize(
@@ -151,12 +177,12 @@ def test_the_most_believed_is_tested_too(finished):
     assert 0 <= scores["most_believed"]["held_out"] <= 20
 
 
-def test_a_robot_that_was_measured(finished, tmp_path):
+def test_a_robot_that_was_measured(tmp_path):
     path, out = tmp_path / "robot.yaml", tmp_path / "out.json"
     calibration = Calibration((0.7,) * 4 + (1.3,) * 4, (0.02, 0.0204), 0.055)
     calibration.save(path)
     own = ["--calibration", str(path)]
-    options = [str(finished), "--starts", "5", "--noise", "calibrated"]
+    options = ["wall-follower", "--starts", "5", "--noise", "calibrated"]
     means = []
     for more in ([], ["--randomise"], own):
         assert evaluate_policies([*options, *more, "--json", str(out)]) == 0
@@ -168,7 +194,7 @@ def test_a_robot_that_was_measured(finished, tmp_path):
         "track": calibration.track,
     }
     for wrong, message in {
-        (str(finished), *own): "calibration needs noise: calibrated or strong, got",
+        ("wall-follower", *own): "calibration needs noise: calibrated or strong, got",
         (*options, *own, "--randomise"): "expected randomise or calibration, got both",
         (*options, "--json", str(tmp_path)): "--json: expected a name that ends in .j",
         (*options, "--json", "run/history.csv"): "ends in .json, got 'run/history.csv'",

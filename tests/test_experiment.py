@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from epuck_mj.errors import UserError
-from epuck_mj.rungs.mujoco_batch import MujocoRobots
+from epuck_mj.rungs.simulator import Simulator
+from epuck_mj.rungs.table import robots_in
+from epuck_mj.scene.model import Scene
 from epuck_mj.step.control import TaskParameters, control_step
 from epuck_mj.step.sensors import observe
 from evolution.judging.held_out_starts import starts_for_test, starts_for_validation
@@ -107,7 +109,7 @@ def test_the_number_of_threads_changes_nothing(name):
 
 @every_experiment
 def test_both_engines_give_the_same_bytes(name):
-    config = tiny(name, steps=40, evaluations=16)
+    config = tiny(name, robot="epuck", steps=40, evaluations=16)
     batch, dm_control = (
         evolved(config, engine=engine, racing=False)
         for engine in ("batch", "dm_control")
@@ -134,9 +136,15 @@ def test_streams_depend_on_each_part_of_their_key():
 # records
 
 
+@cache
+def one_robot(scene: Scene) -> Simulator:
+    """A robot in a scene, made once."""
+    return robots_in(scene, 1, 1)
+
+
 def slow_trial(scene, policy, start, task: TaskParameters) -> tuple[float, int, bool]:
     """Fitness of one robot's trial, the steps it lived and whether it crashed."""
-    robots = MujocoRobots(scene, 1, 1)
+    robots = one_robot(scene)
     observation = observe(robots.reset(start[None]).distance, task.sensor_range)
     fitness = 0.0
     for i in range(task.steps):
@@ -238,7 +246,7 @@ def test_history_reads_back_exactly():
         generation, evaluations, *rest, robot = row.split(",")
         assert (int(generation), int(evaluations)) == astuple(record)[:2]
         assert tuple(map(float, rest)) == astuple(record)[2:5]
-        assert robot == "epuck_planar"
+        assert robot == "epuck_kinematic"
 
 
 def test_no_history_yet():
@@ -409,7 +417,8 @@ def test_held_out_starts_are_the_same_for_every_run(draw, n):
 
 
 def test_held_out_starts_suit_the_wheeled_robot_too():
-    planar, wheeled = (
-        Evolution(tiny("ga", robot=robot)).space for robot in ("epuck_planar", "epuck")
+    cheap, wheeled = (
+        Evolution(tiny("ga", robot=robot)).space
+        for robot in ("epuck_kinematic", "epuck")
     )
-    assert np.array_equal(starts_for_test(planar), starts_for_test(wheeled))
+    assert np.array_equal(starts_for_test(cheap), starts_for_test(wheeled))

@@ -160,7 +160,8 @@ def test_own_parts_change_nothing_of_what_changes_nothing(here):
         "dm_control": "--engine dm_control",
     }
     for name, flags in ways.items():
-        assert evolve(f"{ALL_OWN} {flags} --output {name}".split()) == 0
+        argv = f"{ALL_OWN} --robot epuck {flags} --output {name}".split()
+        assert evolve(argv) == 0
     for name in ways:
         for file in ("history.csv", "champion.json"):
             expected = (here / "batch" / file).read_bytes()
@@ -188,8 +189,10 @@ def test_racing_changes_nothing_where_each_step_costs(here):
     assert one.read_bytes() == other.read_bytes()
 
 
-def test_an_edited_part_is_refused_on_resume(here):
+def test_an_edited_part_is_refused_on_resume(here, capsys):
     assert evolve(f"{ALL_OWN} --output run".split()) == 0
+    slower = "memory.py:Elman: run step by step on epuck_kinematic, with the same"
+    assert capsys.readouterr().err.count(slower) == 1
     provenance = here / "run" / "provenance.json"
     unfinished = json.loads(provenance.read_text()) | {"finished": None}
     provenance.write_text(json.dumps(unfinished))

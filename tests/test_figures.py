@@ -72,6 +72,14 @@ def test_fitness_figure_shows_best_and_mean():
     assert legend_texts(figure) == ["best of the generation", "mean of the population"]
 
 
+def test_a_climb_is_marked():
+    best = np.linspace(10, 200, 10)
+    figure = fitness_figure(EVALUATIONS, best, best, "DE", climbed=700)
+    *_, mark = figure.axes[0].lines
+    assert np.unique(mark.get_xdata()).tolist() == [700]
+    assert legend_texts(figure)[-1] == "on wheels from here"
+
+
 def test_one_generation_is_enough(tmp_path):
     save_figure(fitness_figure([100], [3.0], [1.0], "short"), tmp_path / "a.png")
 

@@ -13,6 +13,7 @@ from matplotlib.legend import Legend
 from epuck_mj.constants import TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.rungs.table import RUNGS
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.motors import Speeds
 from evolution.gap import worlds as gap_worlds
@@ -84,7 +85,7 @@ def test_a_world_has_one_robot_and_new_noise_in_each_trial():
     assert (one.latency == world.latency).all()
 
 
-@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
+@pytest.mark.parametrize("robot", RUNGS)
 def test_a_world_like_home_keeps_everything(robot):
     (home,) = ideal([FOLLOWER], robot, 20, 1)
     ((same,),) = abroad([FOLLOWER], [HOME], robot, 20, 1)
@@ -97,9 +98,9 @@ def test_a_world_like_home_keeps_everything(robot):
 
 
 def test_ideal_robots_in_another_arena():
-    (home,) = ideal([FOLLOWER], "epuck_planar", 20, 1)
-    (same,) = ideal([FOLLOWER], "epuck_planar", 20, 1, "arena")
-    (small,) = ideal([FOLLOWER], "epuck_planar", 20, 1, "small_square")
+    (home,) = ideal([FOLLOWER], "epuck_kinematic", 20, 1)
+    (same,) = ideal([FOLLOWER], "epuck_kinematic", 20, 1, "arena")
+    (small,) = ideal([FOLLOWER], "epuck_kinematic", 20, 1, "small_square")
     assert same == home
     # no wall is far away
     assert small.fitness > 1.1 * home.fitness
@@ -108,8 +109,8 @@ def test_ideal_robots_in_another_arena():
 def test_threads_and_company_change_nothing():
     other = named_policies(str(CHAMPION))
     places = worlds(3)[:2]
-    alone = list(abroad([FOLLOWER], places, "epuck_planar", 4, 1))
-    both = list(abroad([*other, FOLLOWER], places, "epuck_planar", 4, 2))
+    alone = list(abroad([FOLLOWER], places, "epuck_kinematic", 4, 1))
+    both = list(abroad([*other, FOLLOWER], places, "epuck_kinematic", 4, 2))
     assert [outcomes[-1] for outcomes in both] == [outcomes[0] for outcomes in alone]
 
 
@@ -117,9 +118,9 @@ def test_a_trial_lasts_as_long_in_every_world():
     """Faster control steps are more of them; a mean step is worth the same."""
     for period in (0.075, 0.125):
         ((found,),) = abroad(
-            [FOLLOWER], [replace(HOME, period=period)], "epuck_planar", 20, 1
+            [FOLLOWER], [replace(HOME, period=period)], "epuck_kinematic", 20, 1
         )
-        (home,) = ideal([FOLLOWER], "epuck_planar", 20, 1)
+        (home,) = ideal([FOLLOWER], "epuck_kinematic", 20, 1)
         assert abs(found.fitness / home.fitness - 1) < 0.2
 
 
@@ -247,7 +248,7 @@ def test_the_document_says_who_kept_what():
     more = Transfer(
         *(getattr(TRANSFER, f.name)[..., members] for f in fields(TRANSFER))
     )
-    both = {"epuck": more, "epuck_planar": more}
+    both = {"epuck": more, "epuck_kinematic": more}
     ranked = to_markdown(
         gap_document(
             Gap(list("abcde"), both, groups, {"0.1 m/s": range(5)}, 5, LATENCY)
@@ -284,7 +285,7 @@ def test_the_figure_names_experiments_as_reports_do():
 def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
     output = tmp_path / "new" / "gap"
     arguments = ["wall-follower", str(CHAMPION), "--output", str(output)]
-    small = ["--worlds", "3", "--starts", "2", "--robot", "epuck_planar"]
+    small = ["--worlds", "3", "--starts", "2", "--robot", "epuck_kinematic"]
     assert measure_gap([*arguments, *small]) == 0
     names = {path.name for path in output.iterdir()}
     pictures = {"gap.png", "gap.svg", "gap.pdf"}
@@ -292,7 +293,7 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
     assert (output / "gap.md").read_text() in capsys.readouterr().out
     record = json.loads((output / "gap.json").read_text())
     assert len(record["worlds"]) == 3
-    policies = record["robots"]["epuck_planar"]
+    policies = record["robots"]["epuck_kinematic"]
     assert list(policies) == ["wall-follower", str(CHAMPION)]
     with (output / "gap.csv").open() as file:
         rows = list(csv.DictReader(file))
@@ -336,6 +337,6 @@ def test_bad_input_is_one_line(arguments, words, tmp_path):
 def test_every_arena_of_the_worlds_is_shipped():
     for arena in gap_worlds.ARENAS:
         ((found,),) = abroad(
-            [FOLLOWER], [replace(HOME, arena=arena)], "epuck_planar", 2, 1
+            [FOLLOWER], [replace(HOME, arena=arena)], "epuck_kinematic", 2, 1
         )
         assert 0 <= found.fitness <= 1

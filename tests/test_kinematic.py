@@ -1,17 +1,21 @@
 """The kinematic rung: against MuJoCo's geometry, equations of motion, and the loop."""
 
+import errno
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core import caching, event
 
 from epuck_mj.errors import UserError
 from epuck_mj.policies.network import Controller, Network
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.disturbed import disturbed
+from epuck_mj.rungs.kinematic import compiling
 from epuck_mj.rungs.kinematic.fused import FITNESS, FusedTrials
 from epuck_mj.rungs.kinematic.kernel import COS, SIN, X, Y, distance_to, sense_all
 from epuck_mj.rungs.kinematic.plan import plan_of
@@ -388,7 +392,58 @@ def test_every_processor_gives_the_same_bits(algorithm, more, noise):
 
 
 def test_code_that_cannot_be_kept_is_compiled_again(monkeypatch):
-    from epuck_mj.rungs.kinematic import compiling
-
     monkeypatch.setattr(compiling, "FOLDERS", [])
     assert compiling.compiled()(lambda x: x + 1)(2) == 3
+
+
+@pytest.fixture
+def teller():
+    """A new one beside the process's own, which may have told already."""
+    teller = compiling._Teller()
+    event.register("numba:compile", teller)
+    yield teller
+    event.unregister("numba:compile", teller)
+
+
+def test_compiling_is_told_once_and_only_where_there_is_some(
+    teller, tmp_path, monkeypatch, capsys
+):
+    def add(x):
+        return x + 1
+
+    monkeypatch.setattr(compiling, "FOLDERS", [tmp_path])
+    # the process's own may tell as well
+    capsys.readouterr()
+    for arguments in ((1,), (1.0,)):
+        assert compiling.compiled()(add)(*arguments) == 2
+    first, last = capsys.readouterr().err.splitlines()[-2:]
+    assert first.endswith("simulator, which is done once on this computer ...")
+    assert re.fullmatch(r"compiled in \d+\.\d s", last)
+    # kept: another process would find it
+    again = compiling._Teller()
+    event.register("numba:compile", again)
+    try:
+        assert compiling.compiled()(add)(1) == 2
+    finally:
+        event.unregister("numba:compile", again)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_cache_that_breaks_costs_time_only(tmp_path, monkeypatch):
+    def twice(x):
+        return 2 * x
+
+    def breaks(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(compiling, "FOLDERS", [tmp_path])
+    monkeypatch.setattr(caching.IndexDataCacheFile, "save", breaks)
+    assert compiling.compiled()(twice)(2) == 4
+    monkeypatch.undo()
+    monkeypatch.setattr(compiling, "FOLDERS", [tmp_path])
+    assert compiling.compiled()(twice)(2) == 4
+    # what a power cut leaves of an index
+    (index,) = tmp_path.rglob("*.nbi")
+    index.write_bytes(b"")
+    assert compiling.compiled()(twice)(2) == 4
+    assert index.stat().st_size > 0

@@ -35,7 +35,7 @@ TASK = TaskParameters()
 class Arena:
     """Measures trials in one arena."""
 
-    def __init__(self, robot: str = "epuck_planar", arena: str = "arena"):
+    def __init__(self, robot: str = "epuck_kinematic", arena: str = "arena"):
         self.scene = load_scene(robot, arena)
         self.probe = ClearanceProbe(self.scene)
         self.loops: WallLoops = wall_loops(self.scene)
@@ -341,6 +341,7 @@ def test_an_island_is_followed(tmp_path):
     ]
     path.write_text(
         f"<mujoco><worldbody>{''.join(walls)}"
+        '<geom type="plane" size="1 1 0.1"/>'
         '<geom type="cylinder" pos="0 0 0.03" size="0.1 0.03"/></worldbody></mujoco>'
     )
     island = Arena(arena=str(path))

@@ -54,7 +54,7 @@ def of_a_person(folder: Path, scores: dict) -> NamedPolicy:
     return policy
 
 
-def champion(path: Path, robot: str = "epuck_planar") -> Path:
+def champion(path: Path, robot: str = "epuck_kinematic") -> Path:
     """A controller file of a first gene 1."""
     genome = np.eye(Network().n_genes)[0]
     task, origin = TaskParameters(steps=7), Origin(robot, "round")

@@ -5,6 +5,7 @@ import pytest
 
 from epuck_mj.constants import N_PROXIMITY, PROXIMITY_RANGE
 from epuck_mj.policies.wall_follower import WallFollower
+from epuck_mj.rungs.table import RUNGS
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import load_scene
 from epuck_mj.step.control import TaskParameters
@@ -123,7 +124,7 @@ def test_a_trial_of_one_row_has_a_phase():
 
 @pytest.mark.parametrize("start", [(0.0, 0.0, 0.5), (0.3, 0.2, 0.5), (-0.4, 0.0, 3.0)])
 def test_a_follower_searches_follows_and_takes_corners(start):
-    scene = load_scene("epuck_planar", "arena", CONTROL_STEP)
+    scene = load_scene("epuck_kinematic", "arena", CONTROL_STEP)
     trajectory = record(scene, WallFollower(), np.array(start), TaskParameters())
     clearance = ClearanceProbe(scene, 1).measure(trajectory.pose).distance
     phase = phases(trajectory, clearance)
@@ -137,7 +138,7 @@ def test_a_follower_searches_follows_and_takes_corners(start):
     assert (corner[:, 0] > 0.2).mean() > 0.9
 
 
-@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
+@pytest.mark.parametrize("robot", RUNGS)
 def test_who_drives_on_crashes(robot):
     def straight_on(observation):
         return np.broadcast_to([1.0, 0.0], (*observation.shape[:-1], 2)).copy()

@@ -62,6 +62,17 @@ def shown_on_a_terminal(code: str) -> str:
     return shown.decode()
 
 
+def test_on_wheels_the_robot_is_named(capsys):
+    with Progress() as progress:
+        progress.begin(200, 0)
+        for climbed in (False, True):
+            record = Record(0, 100 + 100 * climbed, 2.0, 1.0, 0.5, 9, 0.25, climbed)
+            progress.update(record)
+    below, above = capsys.readouterr().err.splitlines()
+    assert "robot=" not in below
+    assert above.endswith(" crash=25% robot=epuck")
+
+
 def test_a_terminal_gets_a_bar():
     shown = shown_on_a_terminal("from tests import test_progress as t; t.show()")
     last = shown.replace("\r", "\n").strip().splitlines()[-1]

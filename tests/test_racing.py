@@ -297,7 +297,8 @@ def test_racing_changes_nothing_but_the_cost(name, fitness):
 
 @pytest.mark.parametrize("capacity", [2, 7, 29])
 def test_chunks_smaller_than_the_population_change_nothing(capacity, monkeypatch):
-    config = small("de-best", evaluations=40)
+    # trials that are stepped: compiled ones have no chunks
+    config = small("de-best", robot="epuck", evaluations=40)
     whole = evolved(config)
     monkeypatch.setattr(evaluation, "CAPACITY", capacity)
     parts = evolved(config)
@@ -308,7 +309,7 @@ def test_chunks_smaller_than_the_population_change_nothing(capacity, monkeypatch
 
 @pytest.mark.parametrize("name", RACES[:2])
 def test_dm_control_gives_the_same_bytes_as_a_race(name):
-    config = small(name, evaluations=60, trials=2)
+    config = small(name, robot="epuck", evaluations=60, trials=2)
     raced = evolved(config)
     assert_same(raced, evolved(config, engine="dm_control"))
     assert sum(steps_of(raced)) < sum(steps_of(evolved(config, racing=False)))

@@ -44,7 +44,7 @@ def here(tmp_path, monkeypatch):
 def write_champion(path, seed=0, arena="arena", **task):
     genome = np.random.default_rng(seed).uniform(-5, 5, Network().n_genes)
     parameters = replace(TaskParameters(steps=STEPS), **task)
-    origin = Origin("epuck_planar", arena)
+    origin = Origin("epuck_kinematic", arena)
     file = ControllerFile(Network(), genome, parameters, origin, {"stored": 12.34})
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(file.to_json())
@@ -302,10 +302,10 @@ def test_arena_and_robot_can_be_others(champion, here):
     other = write_champion(here / "o" / "champion.json", 0, arena="pillars")
     (alike,) = shown(other).poses.values()
     np.testing.assert_array_equal(alike, poses)
-    (planar,) = shown(champion, "--robot", "epuck_planar").poses.values()
+    (cheap,) = shown(champion, "--robot", "epuck_kinematic").poses.values()
     (wheeled,) = shown(champion, "--robot", "epuck").poses.values()
-    assert planar.shape == wheeled.shape
-    assert (planar != wheeled).any()
+    assert cheap.shape == wheeled.shape
+    assert (cheap != wheeled).any()
 
 
 def ahead(observation):

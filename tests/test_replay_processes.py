@@ -49,7 +49,7 @@ def here(alone, monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "disabled")
     monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
     genome = np.random.default_rng(0).uniform(-5, 5, Network().n_genes)
-    task, origin = TaskParameters(steps=8), Origin("epuck_planar", "arena")
+    task, origin = TaskParameters(steps=8), Origin("epuck_kinematic", "arena")
     file = ControllerFile(Network(), genome, task, origin, {})
     (alone / "champion.json").write_text(file.to_json())
     return alone

@@ -122,8 +122,8 @@ def test_runs_read_back_exactly(study):
     assert all(row["meaning"] for row in described)
     fitness = next(row for row in described if row["column"] == "epuck_worst")
     assert fitness["unit"] == "fitness, at most 300"
-    assert columns.index("epuck_mean") < columns.index("epuck_planar_mean")
-    assert columns.index("epuck_planar_mean") < columns.index("stored")
+    assert columns.index("epuck_mean") < columns.index("epuck_kinematic_mean")
+    assert columns.index("epuck_kinematic_mean") < columns.index("stored")
 
 
 def test_a_run_that_says_less_has_empty_cells(tmp_path):
@@ -445,7 +445,7 @@ def test_report_of_a_partial_study(written, capsys):
     assert "- ga: no finished run of seed 3" in text
     # held-out first, on wheels first, then what evolution believes
     head = next(line for line in text.splitlines() if ": best run" in line)
-    order = [head.index(w) for w in ("wheeled robot", "planar robot", "best stored")]
+    order = [head.index(w) for w in ("wheeled robot", "kinematic robot", "best stored")]
     assert order == sorted(order)
     assert "no verdict" in text
     assert not re.search(r"significan|\\\*", text)
@@ -487,7 +487,7 @@ def test_tables_have_columns_of_different_names_and_units(study):
     heads = {column for table in found for column in table.columns}
     assert {
         "wheeled robot: crashes [%]",
-        "planar robot: best run [of 300]",
+        "kinematic robot: best run [of 300]",
         "clearance [mm]",
         "to 50 [evaluations]",
         "control steps [k]",
@@ -536,7 +536,7 @@ def test_wide_tables_say_that_they_can_be_moved(written):
 
 
 def test_columns_of_a_robot_of_ones_own_have_plain_names(large):
-    robots = {"epuck_planar": "/a b/My Robot-2.xml", "epuck": "/c/my_robot_2.xml"}
+    robots = {"epuck": "/a b/My Robot-2.xml", "epuck_kinematic": "/c/my_robot_2.xml"}
     runs = tuple(
         replace(
             run,
@@ -707,7 +707,7 @@ def test_luck_with_noise_is_held_against_starts_with_noise(tmp_path):
     runs = []
     for run in data.runs["ga"]:
         test = HeldOut(mean=run.scores.stored - 7.0, crash_rate=0.0, starts=1000)
-        tested = {"held_out_as_evolved": {"epuck_planar": test}}
+        tested = {"held_out_as_evolved": {"epuck": test}}
         runs.append(replace(run, scores=run.scores.model_copy(update=tested)))
     data = replace(data, runs={**data.runs, "ga": tuple(runs)})
     _, _, _, held_out, found, *believed = row()

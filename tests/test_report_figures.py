@@ -43,7 +43,7 @@ from evolution.report.samples import TARGET_SHARES
 from evolution.settings.config_files import load_config, shipped_experiments
 from evolution.study.data import RunData, StudyData
 
-ROBOTS = ("epuck_planar", "epuck")
+ROBOTS = ("epuck", "epuck_kinematic")
 STEPS = 300
 N_RUNS = {"de-best": 12, "ga": 2, "my own": 1, "cma-es": 0}
 POPULATION = {"de-best": 150, "ga": 100, "my own": 30}
@@ -254,7 +254,7 @@ def test_stored_and_held_out_shows_every_run_in_order_of_stored_fitness(data):
         order = np.argsort(data.stored(name))
         stored, *tests = dots(axes)
         np.testing.assert_array_equal(stored[:, 1], data.stored(name)[order])
-        for test, robot in zip(tests, ["epuck", "epuck_planar"], strict=True):
+        for test, robot in zip(tests, reversed(ROBOTS), strict=True):
             np.testing.assert_array_equal(test[:, 0], stored[:, 0])
             np.testing.assert_array_equal(test[:, 1], data.held_out(name, robot)[order])
         (luck,) = collections(axes, LineCollection)
@@ -286,11 +286,12 @@ def test_held_out_shows_every_run_the_quartiles_and_the_yardstick(data):
     assert "hand-written wall follower" in caption
 
 
-def test_rungs_shows_the_last_robot_against_the_first(data):
+def test_rungs_shows_wheels_against_the_robot_that_evolution_began_on(data):
+    assert data.rungs == ("epuck_kinematic", "epuck")
     figure, _ = drawn(rungs_figure(data))
     (axes,) = figure.axes
     for found, name in zip(dots(axes), ["de-best", "ga", "my own"], strict=True):
-        expected = [data.held_out(name, robot) for robot in ROBOTS]
+        expected = [data.held_out(name, robot) for robot in data.rungs]
         np.testing.assert_array_equal(found.T, expected)
     assert "GA (n = 2)" in legend_texts(figure)
     assert axes.get_xlim() == axes.get_ylim() == (0, STEPS)
@@ -302,8 +303,8 @@ def test_rungs_shows_the_last_robot_against_the_first(data):
 def test_behaviour_shows_mean_shares(data):
     run = data.runs["ga"][0]
     tests = {
-        "epuck_planar": a_test(1.0, {"crashed": 1.0}),
-        "epuck": a_test(1.0, {"stuck": 1.0}),
+        "epuck": a_test(1.0, {"crashed": 1.0}),
+        "epuck_kinematic": a_test(1.0, {"stuck": 1.0}),
     }
     other = replace(run, scores=Scores(stored=1.0, held_out=tests))
     runs = {**data.runs, "ga": (run, other)}

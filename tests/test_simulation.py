@@ -10,13 +10,18 @@ from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.rungs.watched_robot import WatchedRobot
-from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters, run_trials
 from epuck_mj.trials.recorder import record
 
 TASK = TaskParameters(steps=80)
 N = 12
+
+
+@pytest.fixture(scope="module")
+def scene(mujoco_scene) -> Scene:
+    return mujoco_scene
 
 
 @pytest.fixture(scope="module")

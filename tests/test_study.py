@@ -697,7 +697,8 @@ def test_checkpoints_take_a_small_share_of_the_time(here, carried, monkeypatch):
             now += 2
 
     config = load_config(here / "one.yaml").model_copy(
-        update={"evaluations": 1000, "steps": 1, "trials": 1}
+        # the engine of a climb would be another one
+        update={"evaluations": 1000, "steps": 1, "trials": 1, "climb": 1.0}
     )
     evolution = execution.Run(config, Directory(here / "run"), Means(), ())
     monkeypatch.setattr(execution, "time", Clock)

@@ -25,7 +25,7 @@ from evolution.study.directory import StudyDirectory
 from tests.processes import PATIENCE
 from tests.shipped import OPTIMIZERS
 
-SHIPPED = ("paper", "quick", "wheels")
+ROBOTS = {"paper": "epuck_planar", "quick": "epuck_kinematic", "wheels": "epuck"}
 GA = "optimizer: {algorithm: genetic_algorithm}\n"
 
 
@@ -103,7 +103,7 @@ def test_other_seeds_are_refused(text, words):
 # reading
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_shipped_studies_load(name):
     config = StudyConfig.load(find_study(name))
     assert list(config.experiments)[:3] == ["de-best", "de-rand", "ga"]
@@ -111,7 +111,7 @@ def test_shipped_studies_load(name):
     for experiment, each in config.experiments.items():
         assert each.optimizer == load_config(find_config(experiment)).optimizer
         assert each.evaluations <= 30_000
-        assert each.robot == ("epuck" if name == "wheels" else "epuck_planar")
+        assert each.robot == ROBOTS[name]
 
 
 def test_transfer_is_about_real_sensors_and_motors():

@@ -196,3 +196,10 @@ def test_what_random_may_be_is_one_line(name, random):
 @pytest.mark.parametrize("random", [0, np.int64(3), np.random.RandomState(3), None])
 def test_random_is_a_seed_a_generator_or_nothing(name, random):
     epuck_mj.load(name, {"random": random, "robot": "epuck_planar"}).reset()
+
+
+def test_a_robot_that_mujoco_does_not_move_is_refused():
+    with pytest.raises(
+        UserError, match="moves robots in MuJoCo: expected robot 'epuck'"
+    ):
+        epuck_mj.load("follow_walls", {"robot": "epuck_kinematic"})

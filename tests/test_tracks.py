@@ -8,7 +8,7 @@ import pytest
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.disturbed import disturbed
-from epuck_mj.rungs.mujoco_batch import MujocoRobots
+from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import TaskParameters, run_trials
@@ -37,8 +37,8 @@ def controllers():
 def test_outcomes_are_those_of_run_trials_to_the_last_bit(
     scene, starts, controllers, capacity
 ):
-    trials = run_trials(MujocoRobots(scene, N, 1), controllers, starts, TASK)
-    robots = MujocoRobots(scene, capacity, 2)
+    trials = run_trials(robots_in(scene, N, 1), controllers, starts, TASK)
+    robots = robots_in(scene, capacity, 2)
     tracks = record_tracks(robots, controllers, starts, TASK)
     assert 0 < trials.crashed.sum() < N
     np.testing.assert_array_equal(tracks.trial_fitness, trials.fitness)
@@ -47,7 +47,7 @@ def test_outcomes_are_those_of_run_trials_to_the_last_bit(
 
 
 def test_each_is_the_trajectory_of_its_trial(scene, starts, controllers):
-    robots = MujocoRobots(scene, N, 2)
+    robots = robots_in(scene, N, 2)
     tracks = record_tracks(robots, controllers, starts, TASK)
     for i in range(N):
         trajectory = record(scene, controllers[i], starts[i], TASK)
@@ -68,11 +68,11 @@ def test_with_disturbances_they_are_still_the_trials_of_run_trials(
     conditions = Conditions("strong", randomise=True)
     met = conditions.draw(np.random.default_rng(5), N, TASK.steps)
     assert met is not None
-    robots = disturbed(MujocoRobots(scene, N, 1), met, TASK.control_step)
+    robots = disturbed(robots_in(scene, N, 1), met, TASK.control_step)
     trials = run_trials(robots, controllers, starts, TASK)
-    ideal = record_tracks(MujocoRobots(scene, N, 1), controllers, starts, TASK)
+    ideal = record_tracks(robots_in(scene, N, 1), controllers, starts, TASK)
     # fewer robots than trials: each part meets its own disturbances
-    tracks = record_tracks(MujocoRobots(scene, 5, 1), controllers, starts, TASK, met)
+    tracks = record_tracks(robots_in(scene, 5, 1), controllers, starts, TASK, met)
     np.testing.assert_array_equal(tracks.trial_fitness, trials.fitness)
     np.testing.assert_array_equal(tracks.crashed, trials.crashed)
     assert (tracks.trial_fitness != ideal.trial_fitness).any()
@@ -96,20 +96,20 @@ def test_many_trajectories_are_those_recorded_one_by_one(scene, starts):
 
 
 def test_a_policy_without_members_serves_any_number(scene, starts):
-    robots = MujocoRobots(scene, 5, 1)
+    robots = robots_in(scene, 5, 1)
     tracks = record_tracks(robots, WallFollower(), starts, TASK)
-    trials = run_trials(MujocoRobots(scene, N, 1), WallFollower(), starts, TASK)
+    trials = run_trials(robots_in(scene, N, 1), WallFollower(), starts, TASK)
     np.testing.assert_array_equal(tracks.trial_fitness, trials.fitness)
 
 
 def test_no_starts_make_no_tracks(scene):
-    robots = MujocoRobots(scene, 1, 1)
+    robots = robots_in(scene, 1, 1)
     tracks = record_tracks(robots, WallFollower(), np.zeros((0, 3)), TASK)
     assert tracks.trial_fitness.shape == (0,)
 
 
 def test_arrays_that_do_not_belong_together_are_refused(scene, starts):
-    robots = MujocoRobots(scene, N, 1)
+    robots = robots_in(scene, N, 1)
     tracks = record_tracks(robots, WallFollower(), starts, TaskParameters(steps=3))
     with pytest.raises(ValueError, match="expected pose of shape"):
         dataclasses.replace(tracks, pose=tracks.pose[:, 1:])

@@ -10,7 +10,7 @@ import pytest
 from epuck_mj.errors import UserError
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
-from epuck_mj.rungs.mujoco_batch import MujocoRobots
+from epuck_mj.rungs.table import RUNGS, robots_in
 from epuck_mj.scene.model import load_scene
 from epuck_mj.step.control import TaskParameters, run_trials
 from epuck_mj.step.fitness import FORMULAS
@@ -24,7 +24,7 @@ STARTS = np.array([[0.0, 0.0, 0.0], [0.42, 0.1, 0.4], [-0.2, -0.44, 3.0]])
 FIELDS = [field.name for field in dataclasses.fields(Trajectory)]
 
 
-@pytest.fixture(scope="module", params=["epuck", "epuck_planar"])
+@pytest.fixture(scope="module", params=RUNGS)
 def scene(request):
     return load_scene(request.param, "arena", TASK.control_step)
 
@@ -48,7 +48,7 @@ def equal(a, b):
 def test_fitness_is_that_of_run_trials_to_the_last_bit(scene, seed):
     genomes = np.stack([genome(seed)] * len(STARTS))
     controllers = Network().decode(genomes)
-    robots = MujocoRobots(scene, len(STARTS), 1)
+    robots = robots_in(scene, len(STARTS), 1)
     trials = run_trials(robots, controllers, STARTS, TASK)
     for i, start in enumerate(STARTS):
         trajectory = record(scene, controllers[i], start, TASK)

@@ -31,7 +31,7 @@ def ahead(observation):
 
 @pytest.fixture(scope="module")
 def scene():
-    return load_scene("epuck_planar", "arena", TASK.control_step)
+    return load_scene("epuck_kinematic", "arena", TASK.control_step)
 
 
 def film(path, scene, trajectories, **named):

@@ -12,7 +12,15 @@ import numpy as np
 
 from epuck_mj.check.at_rest import rest_findings
 from epuck_mj.check.drive import drive_findings
-from epuck_mj.check.findings import Finding, Place, Unusable, error, errors, info
+from epuck_mj.check.findings import (
+    Finding,
+    Place,
+    Unusable,
+    error,
+    errors,
+    info,
+    warning,
+)
 from epuck_mj.check.heights import heights_of
 from epuck_mj.check.parts import part_findings
 from epuck_mj.check.room import room_findings
@@ -38,7 +46,7 @@ from epuck_mj.check.walls import (
 from epuck_mj.errors import UserError
 from epuck_mj.scene.floor import BadGeom
 from epuck_mj.scene.model import Scene, load_scene
-from epuck_mj.scene.model_files import find_arena
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, find_arena
 from epuck_mj.scene.source_files import SourceFiles
 from epuck_mj.scene.starts import FreeSpace, Grid, survey
 from epuck_mj.scene.xml_elements import BadXml
@@ -87,20 +95,21 @@ def check_arena(
         # in an arena that is sound, what is wrong is the robot
         load_scene(robot, "arena")
         tell(f"Checking {path.name} with {Path(robot).stem} ...")
-        checks.append(_check(path, robot, seen))
+        checks.append(_check(path, robot, seen, alone=len(robots) == 1))
     # what was found with each robot is one finding
     findings = dict.fromkeys(found for check in checks for found in check.findings)
     drawn = next((check for check in checks if check.grid), checks[0])
     return Report(path, tuple(findings), drawn.scene, drawn.grid)
 
 
-def _check(arena: Path, robot: str, seen: list[Scene]) -> Report:
+def _check(arena: Path, robot: str, seen: list[Scene], alone: bool) -> Report:
     """Findings about an arena with one robot, as far as they can be made.
 
     Args:
         arena: path of the MJCF.
         robot: name or path.
         seen: scenes of robots whose view was checked; this one is added.
+        alone: whether no other robot can use the arena instead.
     """
     findings: list[Finding] = []
     scene = grid = None
@@ -129,7 +138,7 @@ def _check(arena: Path, robot: str, seen: list[Scene]) -> Report:
                 findings += sight_findings(scene, grid, places, heights)
                 seen.append(scene)
             if not errors(findings):
-                findings += _robot_findings(scene, robot, places)
+                findings += _robot_findings(scene, robot, places, alone)
     except Unusable as problem:
         findings.append(problem.finding)
     return Report(arena, tuple(findings), scene, grid)
@@ -174,15 +183,24 @@ def _about(problem: UserError, arena: Path) -> Finding:
     return error(TOPIC, text.replace(f" '{arena}'", " it"), Place(arena))
 
 
-def _robot_findings(scene: Scene, robot: str, places: Places) -> list[Finding]:
+def _robot_findings(
+    scene: Scene, robot: str, places: Places, alone: bool
+) -> list[Finding]:
     """Findings about a robot at starts, if the arena has any."""
     topic = f"robot {Path(robot).name}"
     rng = np.random.default_rng(SEED)
     starts = FreeSpace(scene, START_CLEARANCE).sample(rng, N_STARTS)
+    place = Place(scene.arena)
+    if robot == KINEMATIC_ROBOT:
+        try:
+            return drive_findings(scene, robot, starts, topic, place)
+        except UserError as problem:
+            text = _about(problem, scene.arena).text
+            return [error(topic, text, place) if alone else warning(topic, text, place)]
     findings = part_findings(scene, starts[0], topic)
     try:
         findings += rest_findings(scene, starts, topic, places)
-        findings += drive_findings(scene, starts, topic, Place(scene.arena))
+        findings += drive_findings(scene, robot, starts, topic, place)
         findings += speed_findings(scene, starts[0], topic)
     except UserError as problem:
         findings.append(_about(problem, scene.arena))

@@ -29,12 +29,13 @@ On wheels, half a metre in other directions differs by up to 2 mm: tyres slip.
 
 
 def drive_findings(
-    scene: Scene, starts: np.ndarray, topic: str, place: Place
+    scene: Scene, robot: str, starts: np.ndarray, topic: str, place: Place
 ) -> list[Finding]:
     """Findings about a robot that drives along a wall and back.
 
     Args:
         scene: robot and arena.
+        robot: its name or path.
         starts: from which the one with the longest way is taken, `(n, 3)`.
         topic: heading of the findings.
         place: what an error is about.
@@ -43,7 +44,7 @@ def drive_findings(
         UserError: if MuJoCo warns of a simulation that means nothing.
     """
     start, length = _longest_way(scene, starts)
-    plain = load_scene(str(scene.robot), PLAIN)
+    plain = load_scene(robot, PLAIN)
     here, crashed = _driven(scene, start, length)
     there, _ = _driven(plain, np.array([-LENGTH_MAX / 2, 0, 0]), length)
     off = np.abs(here - there).max(axis=0)

@@ -25,6 +25,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.limits import check, shown
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import START_CLEARANCE, TaskParameters
 from epuck_mj.step.fitness import StepFacts
@@ -83,6 +84,11 @@ def follow_walls(
         UserError: if robot or arena cannot be used.
     """
     parameters = parameters or TaskParameters()
+    if robot == KINEMATIC_ROBOT:
+        raise UserError(
+            f"the task moves robots in MuJoCo: expected robot '{WHEELED_ROBOT}' or a "
+            f"path, got '{robot}'"
+        )
     scene = load_scene(robot, arena, parameters.control_step)
     task = FollowWalls(
         scene, parameters, space=FreeSpace(scene, start_clearance), random=random

@@ -15,9 +15,8 @@ SHIPPED_ROBOTS = ("epuck.xml", "epuck_planar.xml")
 KINEMATIC_ROBOT = "epuck_kinematic"
 """Name of the robot on wheels when it is simulated without MuJoCo's physics."""
 
-WHEELED_ROBOT, PLANAR_ROBOT = "epuck", "epuck_planar"
-"""Every champion is reported on the first, whatever it was evolved on, and what was
-evolved on it on the second as well."""
+WHEELED_ROBOT = "epuck"
+"""Name of the robot on wheels in MuJoCo: every champion is reported on it."""
 
 
 def absolute(name: str) -> str:

@@ -56,6 +56,7 @@ def fitness_figure(
     mean: ArrayLike,
     title: str,
     steps: int = 300,
+    climbed: float | None = None,
 ) -> Figure:
     """Stored fitness against evaluations, as in figures 3 to 5 of the paper.
 
@@ -65,11 +66,15 @@ def fitness_figure(
         mean: mean stored fitness of each generation, `(generations,)`.
         title: above the axes.
         steps: control steps of a trial, the highest fitness there is.
+        climbed: evaluations after which trials were on wheels; None if they never were
+            or always.
     """
     figure = Figure(figsize=(6, 3.7), layout="constrained")
     axes = figure.add_subplot()
     axes.plot(evaluations, best, color=BLUE, label="best of the generation")
     axes.plot(evaluations, mean, color=VERMILION, lw=1, label="mean of the population")
+    if climbed is not None:
+        axes.axvline(climbed, color="0.4", lw=1, ls=":", label="on wheels from here")
     axes.set(
         title=title,
         xlabel="individual evaluations",
@@ -80,7 +85,7 @@ def fitness_figure(
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.9", lw=0.6)
-    figure.legend(loc="outside lower center", ncols=2, frameon=False)
+    figure.legend(loc="outside lower center", ncols=3, frameon=False)
     return figure
 
 

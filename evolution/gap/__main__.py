@@ -10,7 +10,7 @@ import tyro
 from epuck_mj.host.command_line import check_threads, main, parse, word
 from epuck_mj.host.files import check_writable, writing
 from epuck_mj.host.limits import check_flag
-from epuck_mj.scene.model_files import PLANAR_ROBOT, WHEELED_ROBOT
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 from evolution.named_policies import policies_of
 
 EXAMPLES = (
@@ -28,7 +28,7 @@ class GapOptions:
         output: folder for gap.md, summary.md, gap.json, gap.csv and figures.
         worlds: number of worlds.
         starts: number of test starts in each world and at home.
-        robot: robot that drives; both shipped robots if not given.
+        robot: robot that drives; epuck_kinematic and epuck if not given.
         threads: threads that step the robots; 0 is one per core. Changes no result.
     """
 
@@ -47,7 +47,7 @@ def measure_gap(argv: Sequence[str]) -> int:
     check_flag("starts", options.starts, "worlds")
     check_threads(options.threads)
     policies = policies_of(dict.fromkeys(options.paths))
-    robots = [options.robot] if options.robot else [PLANAR_ROBOT, WHEELED_ROBOT]
+    robots = [options.robot] if options.robot else [KINEMATIC_ROBOT, WHEELED_ROBOT]
     # slow to import
     from evolution.gap.gap_folder import write_gap
     from evolution.gap.outcomes import check_homes

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from epuck_mj.errors import UserError
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene, load_scene
-from epuck_mj.scene.model_files import PLANAR_ROBOT, WHEELED_ROBOT
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.scene.wall_loops import wall_loops
 from epuck_mj.step.control import Everybody, Policy, TaskParameters
@@ -29,9 +30,13 @@ INTERVAL_SEED = 0
 
 
 def tested_on(robot: str) -> list[str]:
-    """Robots on which a robot's champions are tested: that robot and the other kind."""
-    other = PLANAR_ROBOT if robot == WHEELED_ROBOT else WHEELED_ROBOT
-    return list(dict.fromkeys([robot, other]))
+    """Robots on which a robot's champions are tested; what is reported comes first.
+
+    Those of the kinematic robot are reported on wheels, too.
+    """
+    if robot in (KINEMATIC_ROBOT, WHEELED_ROBOT):
+        return [WHEELED_ROBOT, KINEMATIC_ROBOT]
+    return [robot, WHEELED_ROBOT]
 
 
 class Judges:
@@ -67,13 +72,40 @@ class Judges:
             self.add(robot, setting, scene, space)
         return self._made[robot, setting]
 
-    def tested_on(self, robot: str, setting: Setting) -> dict[str, "Judge"]:
-        """The judges of a robot's champions, by robot, that robot first.
+    def refusal(self, robot: str, setting: Setting) -> str | None:
+        """Why a robot that others stand in for cannot drive in an arena, in one line.
+
+        The kinematic robot cannot where a wall has no exact outline; champions are
+        tested on wheels only there. None if it can.
 
         Raises:
             UserError: as `of`.
         """
-        return {Path(each).name: self.of(each, setting) for each in tested_on(robot)}
+        if robot != KINEMATIC_ROBOT:
+            return None
+        scene = self.of(robot, setting).scene
+        try:
+            robots_in(scene, 1, self._threads)
+        except UserError as problem:
+            return f"not tested on {robot}: {problem}"
+        return None
+
+    def refusals(self, robot: str, setting: Setting) -> list[str]:
+        """Why champions of a robot are not tested on another one, a line each."""
+        found = [self.refusal(each, setting) for each in tested_on(robot)]
+        return [refusal for refusal in found if refusal is not None]
+
+    def tested_on(self, robot: str, setting: Setting) -> dict[str, "Judge"]:
+        """The judges of a robot's champions, by robot, as `tested_on` orders them.
+
+        Raises:
+            UserError: as `of`.
+        """
+        return {
+            Path(each).name: self.of(each, setting)
+            for each in tested_on(robot)
+            if self.refusal(each, setting) is None
+        }
 
 
 class Judge:

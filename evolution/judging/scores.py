@@ -113,7 +113,7 @@ class Scores(_Record, frozen=True):
     Attributes:
         stored: fitness that evolution believes in.
         validation: mean on the validation starts, which chose it; nan if unknown.
-        held_out: tests on the test starts by robot, the one it evolved on first.
+        held_out: tests on the test starts by robot; one is `epuck`, on wheels.
         most_believed: the individual that the run believed most in; None if unknown.
         held_out_as_evolved: tests with the disturbances it evolved with, by robot.
     """
@@ -130,15 +130,14 @@ class Scores(_Record, frozen=True):
         Args:
             most: fitness that a trial can reach; None if that is not known.
         """
-        first, *others = sorted(self.held_out, key=lambda robot: robot != WHEELED_ROBOT)
-        test = self.held_out[first]
+        (first, test), *others = _wheels_first(self.held_out).items()
         lines = [
             f"The champion earns {of_most(test.mean, most)}: the mean of "
             f"{test.starts:,} fresh starts on {first}; {test.crash_rate:.0%} of the "
             "trials end in a crash"
         ]
         if others:
-            lines.append(f"On {_in_words({o: self.held_out[o] for o in others})}")
+            lines.append(f"On {_in_words(dict(others))}")
         if self.held_out_as_evolved:
             disturbed = _in_words(self.held_out_as_evolved)
             lines.append(f"With the disturbances it evolved with: {disturbed}")
@@ -157,7 +156,13 @@ class Scores(_Record, frozen=True):
     @property
     def in_short(self) -> str:
         """Part of a line with held-out fitness on each robot and stored fitness."""
-        return f"held-out {_in_words(self.held_out)}; stored {self.stored:.1f}"
+        tests = _in_words(_wheels_first(self.held_out))
+        return f"held-out {tests}; stored {self.stored:.1f}"
+
+
+def _wheels_first(tests: Mapping[str, HeldOut]) -> dict[str, HeldOut]:
+    """The tests by robot: what is reported first."""
+    return dict(sorted(tests.items(), key=lambda test: test[0] != WHEELED_ROBOT))
 
 
 def _in_words(tests: Mapping[str, HeldOut]) -> str:

@@ -31,6 +31,7 @@ PAPERS = ("de-best", "de-rand", "ga")
 """The experiments of the paper."""
 
 ROBOT_NAMES: Mapping[str, str] = {
+    "epuck_kinematic": "kinematic robot",
     "epuck_planar": "planar robot",
     "epuck": "wheeled robot",
 }

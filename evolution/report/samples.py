@@ -76,8 +76,8 @@ def like_for_like(data: StudyData, name: str) -> np.ndarray:
 def most_believed_fitness(data: StudyData, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Stored and held-out fitness of each run's most believed individual, `(n,)`.
 
-    Held-out on the robot evolved on; of the runs that say. None say of experiments with
-    noise: theirs was tested on ideal robots only.
+    Held-out on the robot that is reported; of the runs that say. None say of
+    experiments with noise: theirs was tested on ideal robots only.
     """
     if with_noise(data, name):
         return np.empty(0), np.empty(0)

@@ -75,10 +75,10 @@ def _experiment(data: StudyData, name: str) -> dict[str, Any]:
     }
     if name not in data.with_runs:
         return found
-    first, last = data.robots[0], data.robots[-1]
-    stored, evolved_on = data.stored(name), data.held_out(name, first)
+    first, last = data.rungs or (data.robots[0], data.robots[0])
+    stored, begun_on = data.stored(name), data.held_out(name, first)
     believed, worth = most_believed_fitness(data, name)
-    rank = rank_correlation(evolved_on, data.held_out(name, last))
+    rank = rank_correlation(begun_on, data.held_out(name, last))
     return found | {
         "held_out": {
             robot: {
@@ -100,7 +100,7 @@ def _experiment(data: StudyData, name: str) -> dict[str, Any]:
             "held_out": _described(worth),
         },
         "share_kept_between_robots": _described(
-            kept(data.held_out(name, last), evolved_on)
+            kept(data.held_out(name, last), begun_on)
         ),
         "rank_correlation_between_robots": rank if first != last else None,
     }

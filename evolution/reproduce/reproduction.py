@@ -195,10 +195,10 @@ def _hidden(study: StudyData) -> list[Block]:
 
 
 def _rungs(study: StudyData) -> list[Block]:
-    """Blocks about how much of their planar fitness champions keep on wheels."""
-    if len(study.robots) < 2:
+    """Blocks about how much of their fitness champions keep on the other robot."""
+    if study.rungs is None:
         return [Paragraph("Champions were tested on one robot only.")]
-    first, last = study.robots[0], study.robots[-1]
+    first, last = study.rungs
     shares = {
         name: kept(study.held_out(name, last), study.held_out(name, first))
         for name, runs in study.runs.items()

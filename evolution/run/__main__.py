@@ -126,6 +126,8 @@ def _run(
                 )
         else:
             run.start()
+        for note in run.notes:
+            print(note, file=sys.stderr)
         return _carry_out(run, options.live, progress)
 
 

@@ -8,6 +8,8 @@ import time
 from collections.abc import Iterator, Sequence
 
 from epuck_mj.host.files import writing
+from epuck_mj.host.own_parts import is_own
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT
 from evolution.judging.held_out import Judges
 from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
@@ -20,6 +22,17 @@ from evolution.settings.config import ExperimentConfig
 
 SAVING_SHARE = 0.05
 """Largest share of time for checkpoints, where generations are short."""
+
+
+def _notes(config: ExperimentConfig, judges: Judges) -> Iterator[str]:
+    """Lines that somebody who waits for a run should know."""
+    yield from judges.refusals(config.robot, config.setting)
+    own = [name for name in (config.fitness, config.network) if is_own(name)]
+    if own and config.robot == KINEMATIC_ROBOT:
+        yield (
+            f"{' and '.join(own)}: run step by step on {KINEMATIC_ROBOT}, with the "
+            "same results as compiled trials but slower"
+        )
 
 
 class Run:
@@ -50,6 +63,8 @@ class Run:
         scene, space = self.evolution.scene, self.evolution.space
         judges.add(config.robot, config.setting, scene, space)
         self._judges = judges.tested_on(config.robot, config.setting)
+        self.notes = tuple(_notes(config, judges))
+        """What somebody who waits for the run should know, a line each."""
         self._provenance = provenance(
             scene, config.own_parts, argv, str(means.engine), means.threads
         )
@@ -97,6 +112,7 @@ class Run:
         Raises:
             UserError: if it cannot be written.
         """
+        self.evolution.release()
         with writing():
             scores = write_results(
                 self.evolution, self._judges, self.directory, stage, self._threads

@@ -117,6 +117,10 @@ class Evolution:
         """Run the trials from now on on wheels."""
         self.engine = self._maker(self._wheels)
 
+    def release(self) -> None:
+        """Free the simulated robots, hundreds of megabytes, once all is evolved."""
+        self.__dict__.pop("engine", None)
+
     def _generation(self) -> Record:
         config = self.config
         generation = self.optimizer.generation

@@ -21,6 +21,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import shell_command
 from epuck_mj.host.interruption import deaf_to_interrupts
 from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.trials.recorder import record
 from evolution.judging.held_out_starts import (
@@ -139,6 +140,9 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
     from epuck_mj.show.recording.live import LiveView
 
     scene = load_scene(config.robot, config.arena, config.control_step)
+    above = scene
+    if config.climbs:
+        above = load_scene(WHEELED_ROBOT, config.arena, config.control_step)
     start = starts_for_test(FreeSpace(scene, config.start_clearance), 1)[0]
     # as it evolves: what the first test start meets
     met = held_out_disturbances(config.conditions, Purpose.TEST, 1, config.steps)
@@ -156,7 +160,8 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
             if not np.array_equal(genomes[-1], shown):
                 shown = genomes[-1]
                 policy = config.topology.decode(shown)
-                trajectory = record(scene, policy, start, config.task, met)
+                driven = above if records[-1].climbed else scene
+                trajectory = record(driven, policy, start, config.task, met)
                 view.trial(
                     records[-1].evaluations,
                     records[-1].generation,

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 from tqdm import tqdm
 
+from epuck_mj.scene.model_files import WHEELED_ROBOT
+
 if TYPE_CHECKING:
     from evolution.run.generation_loop import Record
 
@@ -47,6 +49,8 @@ class Progress:
             "mean": f"{record.mean:.1f}",
             "crash": f"{record.crash_rate:.0%}",
         }
+        if record.climbed:
+            figures["robot"] = WHEELED_ROBOT
         if self._terminal:
             self._bar.set_postfix(figures, refresh=False)
             self._bar.update(record.evaluations - self._bar.n)

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 
 from epuck_mj.host import files
 from epuck_mj.policies.file import ControllerFile, Origin
+from epuck_mj.scene.model import Scene
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.step.control import BatchPolicy
 from epuck_mj.step.disturbances import Disturbances
@@ -93,11 +94,7 @@ def judged(
     config, n = evolution.config, evolution.config.test_starts
     met = _met(config)
     tell(f"Choosing the champion on {config.validation_starts:,} fresh starts")
-    engine, wheels = (
-        BatchEngine(scene, config.task, threads)
-        for scene in (evolution.scene, judges[WHEELED_ROBOT].scene)
-    )
-    champion = choose_champion(engine, evolution, stored, wheels)
+    champion = _chosen(evolution, stored, judges[WHEELED_ROBOT].scene, threads)
     policy = config.topology.decode(champion.genome)
     held_out, as_evolved = {}, {}
     for robot, judge in judges.items():
@@ -120,6 +117,17 @@ def judged(
     if as_evolved:
         scores = scores.model_copy(update={"held_out_as_evolved": as_evolved})
     return _controller_file(evolution, champion, scores), scores
+
+
+def _chosen(
+    evolution: Evolution, stored: Stored, on_wheels: Scene, threads: int
+) -> Champion:
+    """The champion; its engines, of hundreds of megabytes, end with the choice."""
+    engine, wheels = (
+        BatchEngine(scene, evolution.config.task, threads)
+        for scene in (evolution.scene, on_wheels)
+    )
+    return choose_champion(engine, evolution, stored, wheels)
 
 
 def _met(config: ExperimentConfig) -> Disturbances | None:
@@ -159,8 +167,18 @@ def _draw_fitness(evolution: Evolution, directory: RunDirectory) -> None:
         title=f"{evolution.optimizer.name}, seed {evolution.config.seed} "
         f"(trials per evaluation: {evolution.config.trials})",
         steps=evolution.config.steps,
+        climbed=next(iter(_spent_before_climb(evolution)), None),
     )
     save_figure(figure, directory.fitness_figure)
+
+
+def _spent_before_climb(evolution: Evolution) -> list[int]:
+    """Evaluations of a run when it climbed; empty if it did not."""
+    return [
+        before.evaluations
+        for before, after in itertools.pairwise(evolution.records)
+        if after.climbed and not before.climbed
+    ]
 
 
 def shown_trials(

@@ -55,7 +55,7 @@ class ExperimentConfig(BaseModel):
         "generations",
     )
     robot: Annotated[str, word("ROBOT")] = Field(
-        "epuck_planar",
+        KINEMATIC_ROBOT,
         description="epuck_kinematic (the robot on wheels without physics: hundreds "
         "of times faster), epuck (on wheels in MuJoCo), epuck_planar (slides on a "
         "plane in MuJoCo) or the path of an MJCF file",

@@ -149,8 +149,11 @@ def _measure_yardstick(directory: StudyDirectory) -> None:
 
     # in the setting of the first experiment
     config = next(iter(directory.stored_config().experiments.values()))
-    judges, n = Judges().tested_on(config.robot, config.setting), config.test_starts
-    tests = {robot: judge.test(WallFollower(), n) for robot, judge in judges.items()}
+    judges, n = Judges(), config.test_starts
+    for refusal in judges.refusals(config.robot, config.setting):
+        print(refusal, file=sys.stderr)
+    judged = judges.tested_on(config.robot, config.setting)
+    tests = {robot: judge.test(WallFollower(), n) for robot, judge in judged.items()}
     # opening the study removes what looks left over
     with locked(directory.path, PATIENCE), files.writing():
         text = json.dumps(KnownScores(held_out=tests).to_dict(), indent=1) + "\n"

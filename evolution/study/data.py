@@ -13,6 +13,7 @@ from epuck_mj.host.command_line import shell_command
 from epuck_mj.host.yaml_and_json import read_json
 from epuck_mj.policies.file import ControllerFile
 from epuck_mj.policies.wall_follower import YARDSTICK
+from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.judging.held_out import tested_on
 from evolution.judging.scores import HeldOut, KnownScores, Scores, read_champion
 from evolution.run.directory import RunDirectory
@@ -59,7 +60,7 @@ class StudyData:
         path: the study's directory.
         configs: of the experiments, in the study's order.
         runs: of each experiment, by ascending seed; there may be none.
-        robots: that every champion was tested on; the one it evolved on comes first.
+        robots: that every champion was tested on; what is reported comes first.
         steps: control steps of a trial: the most that a fitness can be.
         yardstick: tests of the hand-written wall follower by robot; empty if not
             known, or not for all of these experiments.
@@ -73,6 +74,18 @@ class StudyData:
     steps: int
     yardstick: Mapping[str, HeldOut]
     missing: tuple[str, ...]
+
+    @property
+    def rungs(self) -> tuple[str, str] | None:
+        """The robot that evolution began on, and the other one that tested champions.
+
+        None if champions were tested on one robot only.
+        """
+        if len(self.robots) < 2:
+            return None
+        first, last = self.robots[0], self.robots[-1]
+        begun = {Path(config.robot).name for config in self.configs.values()}
+        return (last, first) if last in begun else (first, last)
 
     @property
     def with_runs(self) -> dict[str, tuple[RunData, ...]]:
@@ -112,12 +125,15 @@ def load_study(path: Path) -> StudyData:
     config = directory.stored_config()
     runs: dict[str, tuple[RunData, ...]] = {}
     missing: list[str] = []
+    tested: tuple[str, ...] = ()
     asked = directory.asked_seeds()
     for name, experiment in config.experiments.items():
         finished = []
         for seed in directory.seeds(name):
             try:
-                finished.append(_run(directory.run(name, seed), experiment, seed))
+                run = _run(directory.run(name, seed), experiment, seed, tested)
+                tested = tuple(run.scores.held_out)
+                finished.append(run)
             except UserError as error:
                 missing.append(f"{name} seed {seed}: {error}")
         runs[name] = tuple(finished)
@@ -135,7 +151,6 @@ def load_study(path: Path) -> StudyData:
     yardstick: Mapping[str, HeldOut] = {}
     configs = config.experiments
     first, *others = configs
-    tested = _tested_on(configs[first])
     differing = [n for n in others if configs[n].setting != configs[first].setting]
     if differing:
         missing.append(
@@ -164,8 +179,13 @@ def load_study(path: Path) -> StudyData:
     )
 
 
-def _run(directory: RunDirectory, config: ExperimentConfig, seed: int) -> RunData:
-    """A finished run.
+def _run(
+    directory: RunDirectory,
+    config: ExperimentConfig,
+    seed: int,
+    tested: tuple[str, ...],
+) -> RunData:
+    """A finished run; `tested` are the robots that those before were tested on.
 
     Raises:
         UserError: if it is not finished, damaged, or of another config.
@@ -186,7 +206,7 @@ def _run(directory: RunDirectory, config: ExperimentConfig, seed: int) -> RunDat
     # the report reads of the config what the champion's file says, too
     if (champion.task, champion.network) != (config.task, config.topology):
         raise UserError(f"'{directory.champion}' is of another task or network")
-    expected = _tested_on(config)
+    expected = tested or _tested_on(config, scores)
     for tests in (scores.held_out, scores.held_out_as_evolved):
         if tests and tuple(tests) != expected:
             raise UserError(
@@ -197,8 +217,12 @@ def _run(directory: RunDirectory, config: ExperimentConfig, seed: int) -> RunDat
     return RunData(seed, history, champion, scores, directory.path)
 
 
-def _tested_on(config: ExperimentConfig) -> tuple[str, ...]:
-    """Names of the robots on which champions are tested."""
+def _tested_on(config: ExperimentConfig, scores: Scores) -> tuple[str, ...]:
+    """Names of the robots on which the first run has to be tested."""
+    tests = tuple(scores.held_out)
+    # of what evolved on wheels, the other robot was another one once, or is none
+    if config.robot == WHEELED_ROBOT and tests[0] == WHEELED_ROBOT:
+        return tests
     return tuple(Path(robot).name for robot in tested_on(config.robot))
 
 

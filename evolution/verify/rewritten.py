@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from epuck_mj.host.own_parts import is_own
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.judging.evaluation import evaluate
-from evolution.judging.held_out import Judges
+from evolution.judging.held_out import Judge, Judges
 from evolution.run.champion import Stored, stored_by
 from evolution.run.generation_loop import Evolution
 from evolution.run.history import CLIMBED, HISTORY, Record, csv_columns, timing_text
@@ -55,7 +56,7 @@ def compared(written: Written, judges: Judges, threads: int) -> Outcome:
     else:
         lines += _histories(written, evolution)
         stored = stored_without_checkpoint(written, evolution)
-    tested = judges.tested_on(evolution.config.robot, evolution.config.setting)
+    tested = _judges(written, judges)
     controller, _ = judged(evolution, stored, tested, threads)
     now, name = json.loads(controller.to_json()), written.run.champion.name
     known = said(now, written.champion)
@@ -67,6 +68,14 @@ def compared(written: Written, judges: Judges, threads: int) -> Outcome:
         lines += lines_of_differences(name, before, _arrays(shown))
     # the first generations are compared twice
     return Outcome(tuple(dict.fromkeys(lines)), tuple(unsaid(now, written.champion)))
+
+
+def _judges(written: Written, judges: Judges) -> Mapping[str, Judge]:
+    """Judges of the robots that the champion was tested on: once these were others."""
+    config = written.source
+    names: list[str] = list(written.champion["scores"]["held_out"])
+    robots = {name: name for name in names} | {Path(config.robot).name: config.robot}
+    return {name: judges.of(robots[name], config.setting) for name in names}
 
 
 def _made_of(written: Written, evolution: Evolution) -> Iterator[str]:
@@ -129,8 +138,11 @@ def _histories(written: Written, evolution: Evolution) -> Iterator[str]:
     # an own optimiser's generations may differ in size
     own = is_own(config.optimizer.algorithm)
     left = config.evaluations - spent
+    climbed = bool(written.history[CLIMBED].any())
     # to climb, the population would have been evaluated anew
-    needed = evolution.optimizer.next_size() * (2 if config.climbs else 1)
+    due = config.climbs and spent >= config.climb * config.evaluations
+    climbs = due and not climbed
+    needed = evolution.optimizer.next_size() * (2 if climbs else 1)
     if left < 0 or not (own or left < needed):
         yield (
             f"{written.run.config.name}: evaluations {config.evaluations}, but "

@@ -5,6 +5,8 @@ which it uses has changed. So the folder's name has a hash of all sources that m
 """
 
 import hashlib
+import sys
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -12,6 +14,8 @@ from typing import Any
 
 import numba
 from numba.core import config as _config
+from numba.core import event
+from tqdm import tqdm
 
 config: Any = _config
 """numba's settings, whose names no type checker knows."""
@@ -52,6 +56,61 @@ FOLDERS = _folders()
 """The first is used; without any, each process compiles for itself."""
 
 
+class _Teller(event.Listener):
+    """Tells somebody who waits, once in a process, of what is not in the cache."""
+
+    def __init__(self):
+        """Nothing is being compiled."""
+        self._depth, self._told, self._since = 0, False, 0.0
+
+    def on_start(self, event: Any) -> None:
+        """Say that it takes a while."""
+        if self._depth == 0 and not self._told:
+            self._since = time.monotonic()
+            how = (
+                "which is done once on this computer"
+                if FOLDERS
+                else "in each process anew, as no folder for it can be written"
+            )
+            _say(f"compiling the kinematic simulator, {how} ...")
+        self._depth += 1
+
+    def on_end(self, event: Any) -> None:
+        """Say how long it took."""
+        self._depth -= 1
+        if self._depth == 0 and not self._told:
+            self._told = True
+            _say(f"compiled in {time.monotonic() - self._since:.1f} s")
+
+
+def _say(line: str) -> None:
+    # above a progress bar, if there is one
+    with suppress(OSError):
+        tqdm.write(line, file=sys.stderr)
+
+
+event.register("numba:compile", _Teller())
+
+
+def _forgiving(cache: Any) -> None:
+    """Let a cache that is damaged, or cannot be written, cost no more than time."""
+    load, save = cache.load_overload, cache.save_overload
+
+    def load_overload(*arguments: Any) -> Any:
+        try:
+            return load(*arguments)
+        except Exception:
+            with suppress(OSError):
+                cache.flush()
+            return None
+
+    def save_overload(*arguments: Any) -> None:
+        with suppress(OSError):
+            save(*arguments)
+
+    cache.load_overload, cache.save_overload = load_overload, save_overload
+
+
 def compiled(**options: Any) -> Callable[[Any], Any]:
     """Decorator that compiles a function at its first call."""
     # division by 0 gives infinity, as in numpy: a check at each would cost much
@@ -61,7 +120,10 @@ def compiled(**options: Any) -> Callable[[Any], Any]:
         before = config.CACHE_DIR
         try:
             config.CACHE_DIR = str(FOLDERS[0]) if FOLDERS else ""
-            return numba.njit(**options)(function)
+            dispatcher: Any = numba.njit(**options)(function)
+            if FOLDERS:
+                _forgiving(dispatcher._cache)
+            return dispatcher
         finally:
             config.CACHE_DIR = before
 

@@ -69,7 +69,7 @@ def stored_and_held_out_figure(data: StudyData) -> tuple[Figure, str]:
     caption = (
         f"Stored and held-out fitness of each champion ({counts(data)}). The black "
         "bar is what evolution believed of it; the vertical distance from there down "
-        "to the filled mark, the robot it evolved on, is the luck that it kept. "
+        f"to the filled mark, of the {robot_name(data.robots[0])}, is the luck in it. "
         f"{CHAMPION}"
     )
     if any(with_noise(data, name) for name in runs):
@@ -113,10 +113,10 @@ def held_out_figure(data: StudyData) -> tuple[Figure, str]:
 
 @matplotlib.rc_context(PRINT)
 def rungs_figure(data: StudyData) -> tuple[Figure, str] | None:
-    """Held-out fitness on the last robot against the first; None if there is one."""
-    if len(data.robots) < 2:
+    """Held-out fitness on one robot against the other; None if there is one."""
+    if data.rungs is None:
         return None
-    first, last = data.robots[0], data.robots[-1]
+    first, last = data.rungs
     runs, styles = data.with_runs, looks(data.configs)
     figure = Figure(figsize=(COLUMN, 4), layout="constrained")
     axes = figure.add_subplot()
@@ -161,7 +161,7 @@ def _draw_luck(axes: Axes, data: StudyData, name: str, look: Look) -> None:
     low, high = everything.min(axis=0), everything.max(axis=0)
     axes.vlines(rank, low, high, color=look.color, lw=0.9, zorder=2)
     axes.scatter(rank, stored, marker="_", s=40, color="black", lw=1.6, zorder=4)
-    # the robot evolved on is filled, and in front
+    # the robot that is reported is filled, and in front
     for i, test in reversed(list(enumerate(tests))):
         axes.scatter(rank, test, **_dots(look, filled=i == 0, area=LUCK_AREA))
     axes.set(xticks=[], xlim=(-1, order.size))

@@ -9,9 +9,9 @@ from evolution.study.data import StudyData
 
 def from_rung_to_rung_section(data: StudyData) -> list[Block]:
     """How champions keep their fitness from robot to robot; nothing for one robot."""
-    if len(data.robots) < 2:
+    if data.rungs is None:
         return []
-    first, last = data.robots[0], data.robots[-1]
+    first, last = data.rungs
     rows = []
     for name, runs in data.with_runs.items():
         a, b = data.held_out(name, first), data.held_out(name, last)
@@ -30,7 +30,7 @@ def from_rung_to_rung_section(data: StudyData) -> list[Block]:
     return [
         Heading("From rung to rung"),
         Paragraph(
-            f"Champions evolved on the {one}, tested on both from the same starts. "
+            f"Champions tested on the {one} and on the {other} from the same starts. "
             f"Kept: fitness on the {other} in percent of that on the {one}, by run. "
             "Rank correlation: Spearman's over runs, given from "
             f"{FEWEST_FOR_RANKS} runs on."

@@ -48,7 +48,7 @@ def what_stored_fitness_promised_section(data: StudyData) -> list[Block]:
     return [
         Heading("What stored fitness promised"),
         Paragraph(
-            f"On the {robot_name(robot)}, which it evolved on: stored against held-out "
+            f"On the {robot_name(robot)}: stored against held-out "
             "fitness of the champion, then of the individual that the run believed "
             "most in. The difference is luck: of many noisy evaluations the highest is "
             "believed. Regained: how much more the champion, chosen on validation "

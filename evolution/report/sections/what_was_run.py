@@ -1,9 +1,11 @@
 """What was run: title, what is missing, and the experiments."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
 from evolution.pages.words import (
     NOTHING,
@@ -16,7 +18,12 @@ from evolution.pages.words import (
 from evolution.report.measures import shown_robots
 from evolution.report.run_table import control_steps
 from evolution.report.samples import tests_of
-from evolution.run.champion import BEST_OF_POPULATION, LATEST_BEST
+from evolution.run.champion import (
+    BEST_OF_POPULATION,
+    LATEST_BEST,
+    N_SCREENING,
+    SCREENED,
+)
 from evolution.study.config import seeds_text
 from evolution.study.data import StudyData
 
@@ -60,7 +67,7 @@ def what_was_run_section(data: StudyData) -> list[Block]:
         Paragraph(
             f"{numbered(sum(map(len, runs.values())), 'finished run')} of "
             f"{numbered(len(runs), 'experiment')}. "
-            f"Evolved on the {robot_name(data.robots[0])}. "
+            f"Evolved on {_evolved_on(data)}. "
             f"Each run's champion is tested on {n_starts} test starts, the same for "
             "all and never seen by evolution, with ideal sensors and motors, on the "
             f"{' and the '.join(map(robot_name, shown_robots(data)))}. The unit is "
@@ -94,12 +101,42 @@ def what_was_run_section(data: StudyData) -> list[Block]:
             f"{data.steps} a trial at most, fewer for "
             "robots that crash, and where racing breaks off who can only lose. "
             "Choosing the champion comes on top, for every algorithm: "
-            f"{_validation_starts(data)} trials of each candidate, which are the best "
-            f"{BEST_OF_POPULATION:.0%} of the last population and the last "
-            f"{LATEST_BEST} that raised the run's best, some of them the same."
+            f"{_validation_starts(data)} trials of each candidate, which are "
+            f"{_candidates(data)} and the last {LATEST_BEST} that raised the run's "
+            f"best, some of them the same.{_finalists(data)}"
         ),
     ]
     return blocks
+
+
+def _evolved_on(data: StudyData) -> str:
+    """Text with the robot that all experiments have, and the one they climbed to."""
+    configs = list(data.configs.values())
+    text = f"the {robot_name(Path(configs[0].robot).name)}"
+    if any(config.climbs for config in configs):
+        text += f", then on the {robot_name(WHEELED_ROBOT)}"
+    return text
+
+
+def _kinematic(data: StudyData) -> bool:
+    return next(iter(data.configs.values())).robot == KINEMATIC_ROBOT
+
+
+def _candidates(data: StudyData) -> str:
+    share = "all" if _kinematic(data) else f"the best {BEST_OF_POPULATION:.0%}"
+    return f"{share} of the last population"
+
+
+def _finalists(data: StudyData) -> str:
+    """Sentence about what follows for candidates on the kinematic robot."""
+    if not _kinematic(data):
+        return ""
+    numbers = sorted({config.finalists for config in data.configs.values()})
+    return (
+        f" The best {SCREENED} have {N_SCREENING:,} trials, and the best "
+        f"{' or '.join(map(str, numbers))} of these are compared on the "
+        f"{robot_name(WHEELED_ROBOT)}."
+    )
 
 
 def _validation_starts(data: StudyData) -> str:
