@@ -78,7 +78,7 @@ def test_starts_touch_nothing_and_reach_all_of_the_free_space(path: Path, robot:
 def test_the_hand_written_follower_follows_its_walls(path: Path):
     scene = load_scene("epuck_kinematic", path.stem)
     judge = Judge(scene, FreeSpace(scene, START_CLEARANCE), TaskParameters(), 1)
-    test = judge.test(WallFollower(), 20)
+    test = judge.test(WallFollower(), 100)
     assert test.behaviour["wall follower"] + test.behaviour["hugger"] >= 0.75
     assert test.metrics["laps"] is not None
     assert test.metrics["laps"] > 0.3
