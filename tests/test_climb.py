@@ -172,3 +172,12 @@ def test_finalists_are_compared_on_wheels(monkeypatch, finalists):
         expected.append(("epuck", finalists * 6))
     assert seen == expected
     assert np.isfinite(champion.validation_fitness)
+
+
+@pytest.mark.parametrize("name", OPTIMIZERS)
+@pytest.mark.parametrize("evaluations", [24, 80, 87])
+def test_a_run_too_short_to_climb_spends_all_on_the_kinematic_robot(name, evaluations):
+    """Population and generation do not fit into the last tenth."""
+    evolution = evolved(config(name, climb=0.9, evaluations=evaluations))
+    assert not evolution.climbed
+    assert evolution.evaluations == evaluations - evaluations % 8

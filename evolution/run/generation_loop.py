@@ -96,16 +96,25 @@ class Evolution:
 
     @property
     def _climbs_now(self) -> bool:
-        """Whether the next generation is the first on wheels."""
-        share = self.config.climb * self.config.evaluations
-        return self.config.climbs and not self.climbed and self.evaluations >= share
+        """Whether the next generation is the first on wheels.
+
+        None is if the budget is too small to evaluate the population anew there and a
+        generation after it.
+        """
+        config = self.config
+        due = self.evaluations >= config.climb * config.evaluations
+        fits = self.evaluations + self._climb_size <= config.evaluations
+        return config.climbs and not self.climbed and due and fits
+
+    @property
+    def _climb_size(self) -> int:
+        """Evaluations of a generation that begins with a climb."""
+        return len(self.optimizer.population) + self.optimizer.next_size()
 
     @property
     def finished(self) -> bool:
         """Whether the budget has no evaluations left for another generation."""
-        size = self.optimizer.next_size()
-        if self._climbs_now:
-            size += len(self.optimizer.population)
+        size = self._climb_size if self._climbs_now else self.optimizer.next_size()
         return self.evaluations + size > self.config.evaluations
 
     def run(self) -> Iterator[Record]:
