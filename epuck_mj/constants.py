@@ -64,9 +64,10 @@ tyre friction be integrated with one physics step: see benchmarks/convergence.md
 """
 
 DRIVE_GAIN = 0.02
-"""Gain of a wheel's velocity servo [N m s/rad]: the time constant is 17 ms.
+"""Gain of a wheel's velocity servo [N m s/rad].
 
-Chosen: the real motor takes a new rate at once (FIRMWARE), with its tyre slipping.
+With the robot's mass, speeds follow a command with a time constant of 17 ms. Chosen:
+the real motor takes a new rate at once (FIRMWARE), with its tyre slipping.
 """
 
 STEPS_PER_REVOLUTION = 1000

@@ -9,6 +9,7 @@ from scipy import stats
 
 from evolution.judging.scores import Believed, HeldOut, Scores
 from evolution.report.sections.comparisons import comparisons, comparisons_of
+from evolution.report.sections.what_was_run import evolved_on
 from evolution.reproduce.claims import (
     Claim,
     claims,
@@ -68,6 +69,7 @@ def run(seed: int, best: float, mean: float, held_out: float, follows: float = 1
             "best": best * evaluations / 1000,
             "mean": mean * evaluations / 1000,
             "std": np.ones(10),
+            "climbed": np.zeros(10),
         },
         champion=None,  # type: ignore[arg-type]
         scores=scores,
@@ -366,6 +368,17 @@ def test_reproduction_of_a_single_run():
     assert "Missing: no such study" not in text
     alone = reproduction(data, None, UNEVOLVED, "command")
     assert "Missing: no such study was given." in alone
+
+
+def test_the_simulator_is_what_runs_were_on():
+    """A run that was too short to climb never was on wheels."""
+    data = study({"ga": 200.0}, n=2)
+    first, last = data.runs["ga"]
+    history = last.history | {"climbed": np.repeat([0.0, 1.0], 5)}
+    climbed = replace(last, history=history)
+    both = replace(data, runs={"ga": (first, climbed)})
+    assert evolved_on(data) == "the kinematic robot"
+    assert evolved_on(both) == "the kinematic robot, then on the wheeled robot"
 
 
 def test_the_printed_equation_leaves_nothing_to_evolve():

@@ -191,7 +191,7 @@ def test_racing_changes_nothing_where_each_step_costs(here):
 
 def test_an_edited_part_is_refused_on_resume(here, capsys):
     assert evolve(f"{ALL_OWN} --output run".split()) == 0
-    slower = "memory.py:Elman: run step by step on epuck_kinematic, with the same"
+    slower = "memory.py:Elman: not compiled, so trials on epuck_kinematic run step"
     assert capsys.readouterr().err.count(slower) == 1
     provenance = here / "run" / "provenance.json"
     unfinished = json.loads(provenance.read_text()) | {"finished": None}

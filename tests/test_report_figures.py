@@ -65,6 +65,7 @@ def a_run(name, seed, robots=ROBOTS, evaluations=30_000):
         "best": best,
         "mean": best * rng.uniform(0.2, 0.9),
         "std": np.ones(n),
+        "climbed": np.zeros(n),
     }
     tests = {
         robot: a_test(float(best.max() * rng.uniform(0.3, 1)), SHARES)

@@ -229,7 +229,7 @@ class FollowWalls(base.Task):
         return 0.0 if self.crashed(physics) else None
 
     def crashed(self, physics: mujoco.Physics) -> bool:
-        """Whether the shell touches a wall."""
+        """Whether the shell touched a wall in the control step, however briefly."""
         return bool(self._reading(physics).contact)
 
     def _pose(self, physics: mujoco.Physics) -> np.ndarray:

@@ -115,6 +115,6 @@ class MujocoRobots:
         return ClearanceProbe(self.scene, self._threads)
 
     def _reading(self) -> Reading:
-        # a single physics step has nothing to remember
+        # of a single physics step, the sensor itself says all
         history = self._history[self._active] if self.scene.n_substeps > 1 else None
         return self.scene.reading(self._sensordata[self._active], history)

@@ -103,10 +103,10 @@ class Scene:
         return np.concatenate([qpos[..., base : base + 2], yaw[..., None]], axis=-1)
 
     def sparing(self) -> mujoco.MjModel:
-        """The model without work that a robot does not need that is read once a step.
+        """The model for a robot that is read only at the end of each control step.
 
-        Its rays are new at the end of each control step only. A robot that is read
-        then moves and senses as in `model`, to the bit.
+        It costs less: rays are computed only then. The robot moves and senses as in
+        `model`, to the bit.
         """
         model = copy.copy(self.model)
         rays = model.sensor_type == _SENSOR.mjSENS_RANGEFINDER
@@ -126,8 +126,8 @@ class Scene:
 
         Args:
             sensordata: MuJoCo's, `(..., nsensordata)`.
-            history: MuJoCo's, `(..., nhistory)`, to count touches at all physics steps
-                of the last control step; None for those of now.
+            history: MuJoCo's, `(..., nhistory)`: touches in any physics step of the
+                last control step count; if None, only those of now.
         """
         contact = sensordata[..., self._contact] > 0
         if history is not None:
@@ -223,9 +223,9 @@ def load_scene(
 
 
 def _samples(model: mujoco.MjModel, sensor: str) -> slice:
-    """Where MuJoCo's history has the values that a sensor remembers.
+    """Indices in MuJoCo's history of the values that a sensor remembers.
 
-    Behind two numbers of its own and the times come the values.
+    A sensor's part of it is two numbers of MuJoCo's own, the times, then the values.
     """
     index = model.sensor(sensor).id
     n = int(model.sensor_history[index, 0])

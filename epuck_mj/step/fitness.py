@@ -30,7 +30,8 @@ class StepFacts:
         observation: network input without noise, `(..., 8)`: 0 near, 1 free.
         distance: metres along each ray without noise, `(..., 8)`; negative where
             nothing was hit.
-        contact: whether the robot touches a wall, `(...)`: its trial ends here.
+        contact: whether the robot touched a wall in the step, `(...)`: its trial ends
+            here.
         time: since the start, at the end of the step [s].
         poses: gives `pose` when it is asked for.
         clearances: gives `clearance` when it is asked for.

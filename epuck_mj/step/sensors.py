@@ -30,7 +30,8 @@ class Reading:
     Attributes:
         distance: metres along each proximity ray from the shell, `(..., 8)`;
             negative where nothing was hit, as MuJoCo's rangefinders say it.
-        contact: whether the shell touches a wall, `(...,)`, bool.
+        contact: whether the shell touched a wall in the step, however briefly,
+            `(...,)`, bool.
         proximity: counts that `distance` comes from, `(..., 8)`; None of sensors that
             measure distance itself.
         truth: metres along the rays as they are, `(..., 8)`; None where `distance` is

@@ -30,9 +30,10 @@ INTERVAL_SEED = 0
 
 
 def tested_on(robot: str) -> list[str]:
-    """Robots on which a robot's champions are tested; what is reported comes first.
+    """Robots on which a robot's champions are tested; one is `epuck`, on wheels.
 
-    Those of the kinematic robot are reported on wheels, too.
+    Stored fitness is compared with tests on the first: on wheels for champions of the
+    kinematic robot, too.
     """
     if robot in (KINEMATIC_ROBOT, WHEELED_ROBOT):
         return [WHEELED_ROBOT, KINEMATIC_ROBOT]
@@ -73,10 +74,10 @@ class Judges:
         return self._made[robot, setting]
 
     def refusal(self, robot: str, setting: Setting) -> str | None:
-        """Why a robot that others stand in for cannot drive in an arena, in one line.
+        """Why champions are not tested on a robot in an arena, in one line; or None.
 
-        The kinematic robot cannot where a wall has no exact outline; champions are
-        tested on wheels only there. None if it can.
+        Only the kinematic robot may be left out: where a wall has no exact outline it
+        cannot drive, and a test on wheels is enough.
 
         Raises:
             UserError: as `of`.
@@ -91,7 +92,7 @@ class Judges:
         return None
 
     def refusals(self, robot: str, setting: Setting) -> list[str]:
-        """Why champions of a robot are not tested on another one, a line each."""
+        """Why champions are not tested on some robots of `tested_on`, a line each."""
         found = [self.refusal(each, setting) for each in tested_on(robot)]
         return [refusal for refusal in found if refusal is not None]
 

@@ -33,7 +33,7 @@ def reproduction(
     """The text of REPRODUCTION.md.
 
     Args:
-        study: evolved on the plane.
+        study: not evolved on wheels from the start.
         wheels: evolved on wheels from the start, if there is one.
         unevolved: the first generation by each reading of the fitness equation.
         made_by: the command that wrote it.
@@ -81,7 +81,7 @@ def reproduction(
         *(_claims(held_out_order(study, robot)) for robot in shown_robots(study)),
         Heading("What stored fitness hides"),
         *_hidden(study),
-        Heading("From the plane to wheels"),
+        Heading("From one robot to the other"),
         *_rungs(study),
     ]
     blocks.append(Heading("Evolved on wheels from the start"))

@@ -47,7 +47,7 @@ class Options:
         resume: run directory of the run to continue.
         threads: threads that step the robots; 0 is one per core. Changes no result.
         engine: batch steps all robots at once; dm_control runs one trial after the
-            other. Changes no result.
+            other, where MuJoCo moves the robot. Changes no result.
         racing: --no-racing also simulates individuals that cannot win any more, which
             are stopped otherwise. Changes no result.
         live: show curves and the best individual in a rerun viewer that is running.

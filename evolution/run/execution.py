@@ -30,8 +30,8 @@ def _notes(config: ExperimentConfig, judges: Judges) -> Iterator[str]:
     own = [name for name in (config.fitness, config.network) if is_own(name)]
     if own and config.robot == KINEMATIC_ROBOT:
         yield (
-            f"{' and '.join(own)}: run step by step on {KINEMATIC_ROBOT}, with the "
-            "same results as compiled trials but slower"
+            f"{' and '.join(own)}: not compiled, so trials on {KINEMATIC_ROBOT} run "
+            "step by step, which is slower"
         )
 
 

@@ -36,7 +36,7 @@ class Evolution:
 
     A run that climbs begins on the kinematic robot, which is cheap, and spends the rest
     of its budget on wheels in MuJoCo. There its population is evaluated anew, paid from
-    the budget: no fitness of the cheap simulator survives.
+    the budget: no fitness of the kinematic robot is kept.
     """
 
     def __init__(
@@ -98,23 +98,19 @@ class Evolution:
     def _climbs_now(self) -> bool:
         """Whether the next generation is the first on wheels.
 
-        None is if the budget is too small to evaluate the population anew there and a
-        generation after it.
+        A run stays where it is if its budget does not suffice to evaluate the
+        population anew there and a generation after it.
         """
         config = self.config
         due = self.evaluations >= config.climb * config.evaluations
-        fits = self.evaluations + self._climb_size <= config.evaluations
+        size = len(self.optimizer.population) + self.optimizer.next_size()
+        fits = self.evaluations + size <= config.evaluations
         return config.climbs and not self.climbed and due and fits
-
-    @property
-    def _climb_size(self) -> int:
-        """Evaluations of a generation that begins with a climb."""
-        return len(self.optimizer.population) + self.optimizer.next_size()
 
     @property
     def finished(self) -> bool:
         """Whether the budget has no evaluations left for another generation."""
-        size = self._climb_size if self._climbs_now else self.optimizer.next_size()
+        size = self.optimizer.next_size()
         return self.evaluations + size > self.config.evaluations
 
     def run(self) -> Iterator[Record]:
@@ -123,7 +119,7 @@ class Evolution:
             yield self._generation()
 
     def climb(self) -> None:
-        """Run the trials from now on on wheels."""
+        """Run all further trials on wheels."""
         self.engine = self._maker(self._wheels)
 
     def release(self) -> None:

@@ -140,9 +140,9 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
     from epuck_mj.show.recording.live import LiveView
 
     scene = load_scene(config.robot, config.arena, config.control_step)
-    above = scene
+    on_wheels = scene
     if config.climbs:
-        above = load_scene(WHEELED_ROBOT, config.arena, config.control_step)
+        on_wheels = load_scene(WHEELED_ROBOT, config.arena, config.control_step)
     start = starts_for_test(FreeSpace(scene, config.start_clearance), 1)[0]
     # as it evolves: what the first test start meets
     met = held_out_disturbances(config.conditions, Purpose.TEST, 1, config.steps)
@@ -160,7 +160,7 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
             if not np.array_equal(genomes[-1], shown):
                 shown = genomes[-1]
                 policy = config.topology.decode(shown)
-                driven = above if records[-1].climbed else scene
+                driven = on_wheels if records[-1].climbed else scene
                 trajectory = record(driven, policy, start, config.task, met)
                 view.trial(
                     records[-1].evaluations,

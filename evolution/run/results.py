@@ -167,18 +167,16 @@ def _draw_fitness(evolution: Evolution, directory: RunDirectory) -> None:
         title=f"{evolution.optimizer.name}, seed {evolution.config.seed} "
         f"(trials per evaluation: {evolution.config.trials})",
         steps=evolution.config.steps,
-        climbed=next(iter(_spent_before_climb(evolution)), None),
+        climbed=_spent_before_climb(evolution),
     )
     save_figure(figure, directory.fitness_figure)
 
 
-def _spent_before_climb(evolution: Evolution) -> list[int]:
-    """Evaluations of a run when it climbed; empty if it did not."""
-    return [
-        before.evaluations
-        for before, after in itertools.pairwise(evolution.records)
-        if after.climbed and not before.climbed
-    ]
+def _spent_before_climb(evolution: Evolution) -> int | None:
+    """Evaluations of a run when it climbed; None if it did not."""
+    if not evolution.climbed:
+        return None
+    return max(each.evaluations for each in evolution.records if not each.climbed)
 
 
 def shown_trials(

@@ -63,8 +63,9 @@ class ExperimentConfig(BaseModel):
     climb: Annotated[float, within("climb")] = Field(
         0.9,
         description="share of the evaluations that are spent on epuck_kinematic; the "
-        "rest is spent on epuck, where the population is evaluated anew; 1: none is; "
-        "without effect on other robots",
+        "rest is spent on epuck, where the population is evaluated anew, unless it is "
+        "too little for that; 1: all are spent on epuck_kinematic; without effect on "
+        "other robots",
     )
     arena: Annotated[str, word("ARENA")] = Field(
         "arena", description="name of a shipped arena or the path of an MJCF file"
@@ -151,7 +152,7 @@ class ExperimentConfig(BaseModel):
 
     @property
     def climbs(self) -> bool:
-        """Whether a run ends on another robot than it begins with."""
+        """Whether a run goes on to wheels, if its budget suffices for that."""
         return self.robot == KINEMATIC_ROBOT and self.climb < 1
 
     @property

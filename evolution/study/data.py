@@ -60,7 +60,7 @@ class StudyData:
         path: the study's directory.
         configs: of the experiments, in the study's order.
         runs: of each experiment, by ascending seed; there may be none.
-        robots: that every champion was tested on; what is reported comes first.
+        robots: that every champion was tested on, as `held_out.tested_on` orders them.
         steps: control steps of a trial: the most that a fitness can be.
         yardstick: tests of the hand-written wall follower by robot; empty if not
             known, or not for all of these experiments.
@@ -77,7 +77,7 @@ class StudyData:
 
     @property
     def rungs(self) -> tuple[str, str] | None:
-        """The robot that evolution began on, and the other one that tested champions.
+        """The robot that evolution began on, and the other of the two tested on.
 
         None if champions were tested on one robot only.
         """
@@ -220,7 +220,7 @@ def _run(
 def _tested_on(config: ExperimentConfig, scores: Scores) -> tuple[str, ...]:
     """Names of the robots on which the first run has to be tested."""
     tests = tuple(scores.held_out)
-    # of what evolved on wheels, the other robot was another one once, or is none
+    # champions of wheels were once tested on another robot besides, or on none
     if config.robot == WHEELED_ROBOT and tests[0] == WHEELED_ROBOT:
         return tests
     return tuple(Path(robot).name for robot in tested_on(config.robot))

@@ -71,7 +71,7 @@ def compared(written: Written, judges: Judges, threads: int) -> Outcome:
 
 
 def _judges(written: Written, judges: Judges) -> Mapping[str, Judge]:
-    """Judges of the robots that the champion was tested on: once these were others."""
+    """Judges of the robots that the champion was tested on, which once were others."""
     config = written.source
     names: list[str] = list(written.champion["scores"]["held_out"])
     robots = {name: name for name in names} | {Path(config.robot).name: config.robot}
@@ -138,12 +138,7 @@ def _histories(written: Written, evolution: Evolution) -> Iterator[str]:
     # an own optimiser's generations may differ in size
     own = is_own(config.optimizer.algorithm)
     left = config.evaluations - spent
-    climbed = bool(written.history[CLIMBED].any())
-    # to climb, the population would have been evaluated anew
-    due = config.climbs and spent >= config.climb * config.evaluations
-    climbs = due and not climbed
-    needed = evolution.optimizer.next_size() * (2 if climbs else 1)
-    if left < 0 or not (own or left < needed):
+    if left < 0 or not (own or left < evolution.optimizer.next_size()):
         yield (
             f"{written.run.config.name}: evaluations {config.evaluations}, but "
             f"{written.run.history.name} ends with {spent}"

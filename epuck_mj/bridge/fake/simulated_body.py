@@ -82,7 +82,7 @@ class SimulatedBody:
             start: pose `(3,)`: x, y [m], yaw [rad].
             now: the time [s].
         """
-        # a physics step is all of its control step
+        # its control steps are physics steps
         self._robots = robots_in(replace(scene, n_substeps=1), 1, 1)
         self._reading = self._robots.reset(start[None])
         self._timestep = scene.model.opt.timestep

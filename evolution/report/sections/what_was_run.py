@@ -24,6 +24,7 @@ from evolution.run.champion import (
     N_SCREENING,
     SCREENED,
 )
+from evolution.run.history import CLIMBED
 from evolution.study.config import seeds_text
 from evolution.study.data import StudyData
 
@@ -67,7 +68,7 @@ def what_was_run_section(data: StudyData) -> list[Block]:
         Paragraph(
             f"{numbered(sum(map(len, runs.values())), 'finished run')} of "
             f"{numbered(len(runs), 'experiment')}. "
-            f"Evolved on {_evolved_on(data)}. "
+            f"Evolved on {evolved_on(data)}. "
             f"Each run's champion is tested on {n_starts} test starts, the same for "
             "all and never seen by evolution, with ideal sensors and motors, on the "
             f"{' and the '.join(map(robot_name, shown_robots(data)))}. The unit is "
@@ -109,11 +110,12 @@ def what_was_run_section(data: StudyData) -> list[Block]:
     return blocks
 
 
-def _evolved_on(data: StudyData) -> str:
+def evolved_on(data: StudyData) -> str:
     """Text with the robot that all experiments have, and the one they climbed to."""
-    configs = list(data.configs.values())
-    text = f"the {robot_name(Path(configs[0].robot).name)}"
-    if any(config.climbs for config in configs):
+    config = next(iter(data.configs.values()))
+    text = f"the {robot_name(Path(config.robot).name)}"
+    runs = [run for each in data.runs.values() for run in each]
+    if any(run.history[CLIMBED].any() for run in runs):
         text += f", then on the {robot_name(WHEELED_ROBOT)}"
     return text
 
@@ -131,12 +133,14 @@ def _finalists(data: StudyData) -> str:
     """Sentence about what follows for candidates on the kinematic robot."""
     if not _kinematic(data):
         return ""
-    numbers = sorted({config.finalists for config in data.configs.values()})
-    return (
-        f" The best {SCREENED} have {N_SCREENING:,} trials, and the best "
-        f"{' or '.join(map(str, numbers))} of these are compared on the "
-        f"{robot_name(WHEELED_ROBOT)}."
-    )
+    text = f" The best {SCREENED} have {N_SCREENING:,} trials"
+    numbers = sorted({config.finalists for config in data.configs.values()} - {0})
+    if numbers:
+        text += (
+            f", and the best {' or '.join(map(str, numbers))} of these are compared on "
+            f"the {robot_name(WHEELED_ROBOT)}"
+        )
+    return f"{text}."
 
 
 def _validation_starts(data: StudyData) -> str:
