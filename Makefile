@@ -26,7 +26,7 @@ bench: $(INSTALLED)
 	$(BIN)/python -m benchmarks.throughput --json results/throughput.json
 	$(BIN)/python -m benchmarks.whole_run --json results/whole_run.json
 
-# how much truth each robot tells: about an hour on two cores; it goes on where it was
+# how true each robot is: about an hour on two cores; it goes on where it was stopped
 ladder: $(INSTALLED)
 	$(BIN)/python -m benchmarks.ladder
 
@@ -46,7 +46,7 @@ recording: $(INSTALLED)
 bridge: $(INSTALLED)
 	$(BIN)/python -m benchmarks.bridge --json results/bridge.json
 
-# champions of three seeds of each experiment in pseudo-realities, on both robots
+# champions of three seeds of each experiment in other worlds, kinematic and on wheels
 gap: $(INSTALLED)
 	$(BIN)/python -m evolution.gap \
 	  $(wildcard $(PAPERS:%=results/paper/%/seed-[123])) \

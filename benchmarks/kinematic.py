@@ -1,9 +1,9 @@
 """Throughput of the kinematic robot against wheels: part of `make bench`.
 
-Whole trials with policy and fitness. Each figure is a ratio, or a speed, of one turn;
-medians over the turns are reported. Speeds are simulated seconds per CPU-second on one
-thread, so they fall where other programs use the same core; what two threads gain is
-time by the clock and wants an idle machine.
+Whole trials with policy and fitness. The jobs are measured in turns: ratios are of
+speeds in one turn, and medians over the turns are reported. Speeds are simulated
+seconds per CPU-second on one thread, so they fall where other programs use the same
+core; what two threads gain is time by the clock and wants an idle machine.
 """
 
 import statistics
@@ -31,7 +31,7 @@ CHAMPION = Path("results/paper/de-best/seed-1")
 N_TRIALS = 1500
 N_ON_WHEELS = 150
 ROOMS = (1, 4, 25, 250)
-"""Numbers of square rooms of 1 m, four walls each; a robot is in each alike."""
+"""Numbers of square rooms of 1 m, four walls each; robots are spread over them."""
 
 TASK = TaskParameters()
 
@@ -50,7 +50,7 @@ class Speed:
 
 
 def measure_kinematic(repeats: int) -> dict[str, float]:
-    """Speeds, and ratios of speeds of the same turn, medians over the turns."""
+    """Speeds, and ratios of speeds in one turn: medians over `repeats` turns."""
     square, wheels = (
         load_scene("epuck_kinematic", "arena"),
         load_scene("epuck", "arena"),
@@ -73,7 +73,7 @@ def measure_kinematic(repeats: int) -> dict[str, float]:
     def median(figure: Callable[[dict[str, Speed]], float]) -> float:
         return statistics.median(figure(turn) for turn in turns)
 
-    fewest, most = f"walls_{4 * ROOMS[0]}", f"walls_{4 * ROOMS[-1]}"
+    fewest = f"walls_{4 * ROOMS[0]}"
     return {
         "seconds_per_cpu_second_along_walls": median(lambda t: t["along_walls"].cpu),
         "seconds_per_cpu_second_in_the_open": median(lambda t: t["in_the_open"].cpu),
@@ -92,7 +92,6 @@ def measure_kinematic(repeats: int) -> dict[str, float]:
             )
             for n in ROOMS[1:]
         },
-        "walls": float(most.removeprefix("walls_")),
     }
 
 
@@ -118,7 +117,7 @@ def rooms(folder: Path, n: int) -> Path:
 
 
 def _works(scene: Scene, n: int) -> Callable[[Conditions | None], Work]:
-    """Trials of a champion from `n` starts, under conditions."""
+    """Maker of trials of a champion from `n` starts, under conditions."""
     file = load_controller(CHAMPION)
     starts = FreeSpace(scene, 0.1).sample(np.random.default_rng(0), n)
     controller = file.network.decode(np.tile(file.genome, (n, 1)))

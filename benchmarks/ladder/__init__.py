@@ -1,1 +1,1 @@
-"""Whether the rungs of the ladder tell the truth, and where they do not."""
+"""How far fitness on each rung is from that on converged physics."""

@@ -1,8 +1,9 @@
-"""How much truth each rung tells: `python -m benchmarks.ladder`, or `make ladder`.
+"""How true each rung is: `python -m benchmarks.ladder`, or `make ladder`.
 
-Controllers live on the same starts on each rung and on the reference: the robot on
-wheels with a fifth of its physics step. Writes figures as it goes; a measurement that
-was stopped goes on where it was. Then it writes the page and its picture.
+Controllers drive from the same starts on each rung and on the reference: the robot on
+wheels with a fifth of its physics step. Figures are written as they are measured; a
+measurement that was stopped goes on where it was. Then the page and its picture are
+written.
 """
 
 import json
@@ -14,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.ladder.controllers import tried
-from benchmarks.ladder.page import write_page
+from benchmarks.ladder.page import REFERENCE, write_page
 from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse
 from epuck_mj.rungs.table import robots_in
@@ -23,9 +24,8 @@ from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import START_CLEARANCE, run_trials
 
 ARENAS = {"arena": 1, "l_shape": 3, "pillars": 3, "octagon": 3}
-"""Arenas, and of how many controllers one is measured there."""
+"""Arenas; every controller is measured there (1), or every third one (3)."""
 
-REFERENCE = "reference"
 REFINEMENT = 5
 """The reference's physics step is this many times shorter."""
 
@@ -54,7 +54,7 @@ COLUMNS: Mapping[str, Callable[[str], Scene]] = {
 Measured = dict[str, dict[str, dict[str, list[float]]]]
 """By arena, column and controller: mean fitness and share of trials that crashed.
 
-Under EVOLVED are genomes of the controllers that were evolved here.
+Under EVOLVED, "genomes" are those of the controllers that were evolved here.
 """
 
 EVOLVED = "evolved here"
@@ -66,8 +66,8 @@ class Options:
 
     Attributes:
         results: folder with studies, whose champions are tried.
-        json: file for the figures; figures that are there are not measured again.
-        page: page to write; its picture gets the same name.
+        json: file for the figures; figures that it has are not measured again.
+        page: page to write; its picture gets the same name, with another ending.
         starts: trials of each controller in the square; a quarter elsewhere.
         threads: threads that step the robots; 0 is one per core.
     """
@@ -93,7 +93,7 @@ def ladder(argv: Sequence[str]) -> int:
         for name, scene_in in COLUMNS.items():
             column = found.setdefault(arena, {}).setdefault(name, {})
             scene = scene_in(arena)
-            # the same for all columns
+            # the same on all rungs
             starts = FreeSpace(load_scene("epuck", arena), START_CLEARANCE).sample(
                 np.random.default_rng(START_SEED), n
             )

@@ -1,7 +1,7 @@
 """The controllers that the ladder is measured with.
 
-A controller lives from the errors of the simulator that it evolved on. So controllers
-that evolved on each of them are among these, besides some that did not evolve far.
+A controller may use errors of the simulator that it evolved on. So there are some that
+evolved on each simulator, besides some that did not evolve far.
 """
 
 from collections.abc import Iterator

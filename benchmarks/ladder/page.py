@@ -38,7 +38,7 @@ TOLERANCE = 0.05
 """Relative difference from which a controller is named."""
 
 LEAST = 3.0
-"""Difference of fitness below which none is named: a poor controller has little."""
+"""Difference of fitness below which none is named: poor controllers have little."""
 
 REFERENCE = "reference"
 
@@ -119,7 +119,7 @@ def _named(columns: Mapping[str, Column], tried: Sequence[Tried]) -> list[str]:
     head = ["controller", "evolved on", *rungs]
     lines = [
         "Controllers that differ by more than 5 % on a robot: mean fitness, and the "
-        "share of trials that end at a wall.",
+        "share of trials that end in a crash.",
         "",
         f"| {' | '.join(head)} |",
         "|---|---|" + "---:|" * len(rungs),
@@ -139,22 +139,25 @@ def ladder_figure(columns: Mapping[str, Column]) -> Figure:
         axes.plot([0, 300], [0, 300], color="0.6", linewidth=0.8)
         axes.scatter(true, seen, s=6, color=fraction(colors.BLUE), alpha=0.7, lw=0)
         axes.set(title=rung.replace(", ", ",\n"), aspect="equal")
-        axes.set(xlim=(0, 260), ylim=(0, 260), xlabel="converged robot")
+        axes.set(xlim=(0, 260), ylim=(0, 260), xlabel="reference")
     np.atleast_1d(panels)[0].set_ylabel("mean fitness, of 300")
     return figure
 
 
-HEADER = """# How much truth each robot tells
+HEADER = """# How true each robot is
 
-Made by `make ladder`. {n} controllers live on the same {starts} starts on each robot
+Made by `make ladder`. {n} controllers drive from the same {starts} starts on each robot
 and on the reference: the robot on wheels with a fifth of its physics step, where a
-touch in any physics step is a crash. Controllers are the shipped champions, the bests
-of early and middle generations, random genomes, the hand-written wall follower, and
-champions of DE/best that were evolved on the kinematic robot alone. In arenas other
-than the square, a third of the controllers have a quarter of these starts. Sensors are
-ideal. Fitness is of 300.
+touch in any physics step is a crash. Controllers are the shipped champions, the best
+individuals of early and middle generations, random genomes, the hand-written wall
+follower, and champions of DE/best that were evolved on the kinematic robot alone. In
+arenas other than the square, every third controller has a quarter of these starts.
+Sensors are ideal. Fitness is of 300.
 
-*epuck, touches at the end* is the robot on wheels when only those touches are crashes
-that last to the end of a control step.
+Differences are those of a controller's mean fitness on the robot from that on the
+reference: their mean size, their mean (bias), and the largest. Those below 3 do not
+count as more than 5 %, as poor controllers have little fitness. *epuck, touches at the
+end* is the robot on wheels when only those touches are crashes that last to the end of
+a control step.
 
-![Fitness on each robot against that on the converged robot]({picture})"""
+![Fitness on each robot against that on the reference]({picture})"""
