@@ -1,6 +1,6 @@
 """What racing saves: `python -m benchmarks.racing --json results/racing.json`.
 
-Evolves with racing, as `evolution.run` does, and lives every tenth generation, the
+Evolves with racing, as `evolution.run` does, and runs every tenth generation, the
 first included, a second time without it: the same individuals on the same starts, one
 right after the other, so that the machine's other work falls on both alike. In the
 first nothing can be saved, and it counts ten times: the shares are a little too high.
@@ -14,12 +14,14 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import tyro
 
 from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse
-from epuck_mj.step.control import Trials
+from epuck_mj.scene.model import Scene
+from epuck_mj.step.control import TaskParameters, Trials
 from evolution.judging.evaluation import BatchEngine, Work
 from evolution.run.generation_loop import Evolution
 from evolution.settings.config_files import find_config, load_config
@@ -47,17 +49,28 @@ class Options:
 
 
 class BothWays:
-    """An engine that lives every tenth generation with and without racing."""
+    """An engine that runs every tenth generation with and without racing."""
 
-    def __init__(self, engine: BatchEngine):
+    def __init__(self, task: TaskParameters, threads: int):
         """Measure nothing yet."""
-        self._engine = engine
+        self._task, self._threads = task, threads
         self._generation = 0
         self.steps = {True: 0, False: 0}
         self.seconds = {True: 0.0, False: 0.0}
 
+    def __call__(self, scene: Scene) -> Self:
+        """The engine for a scene; a run that climbs has two, one after the other."""
+        self._engine = BatchEngine(scene, self._task, self._threads)
+        return self
+
     def run(self, work: Work) -> Trials:
         """See `Engine.run`."""
+        if work.race is None:
+            # a population that is evaluated anew after the climb
+            return self._engine.run(work)
+        if self._generation == 0:
+            # compile
+            self._engine.run(work)
         sampled = self._generation % EVERY == 0
         self._generation += 1
         if sampled:
@@ -81,9 +94,8 @@ def racing(argv: Sequence[str]) -> int:
     runs = []
     for seed in parse_seeds(options.seeds):
         seeded = config.model_copy(update={"seed": seed})
-        experiment = Evolution(seeded, threads=options.threads)
-        both = BothWays(BatchEngine(experiment.scene, seeded.task, options.threads))
-        experiment.engine = both
+        both = BothWays(seeded.task, options.threads)
+        experiment = Evolution(seeded, both)
         for record in experiment.run():
             if record.generation % 50 == 0:
                 print(f"seed {seed}: generation {record.generation}", file=sys.stderr)
