@@ -374,7 +374,7 @@ def test_the_simulator_is_what_runs_were_on():
     """A run that was too short to climb never was on wheels."""
     data = study({"ga": 200.0}, n=2)
     first, last = data.runs["ga"]
-    history = last.history | {"climbed": np.repeat([0.0, 1.0], 5)}
+    history = {**last.history, "climbed": np.repeat([0.0, 1.0], 5)}
     climbed = replace(last, history=history)
     both = replace(data, runs={"ga": (first, climbed)})
     assert evolved_on(data) == "the kinematic robot"

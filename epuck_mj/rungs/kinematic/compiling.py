@@ -57,7 +57,7 @@ FOLDERS = _folders()
 
 
 class _Teller(event.Listener):
-    """Tells somebody who waits, once in a process, of what is not in the cache."""
+    """Says, once in a process, that code is compiled that is not in the cache."""
 
     def __init__(self):
         """Nothing is being compiled."""
