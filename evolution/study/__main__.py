@@ -60,8 +60,8 @@ class Options:
         cluster: address of the Dask scheduler that runs are sent to, such as
             tcp://host:8786, or local:4 to start four workers on this machine. Needs the
             extra [cluster].
-        split: with --cluster, do one run at a time and send its evaluations to the
-            workers.
+        split: with --cluster, do one run at a time and send its evaluations in MuJoCo
+            to the workers.
     """
 
     study: tyro.conf.Positional[Annotated[str, word("STUDY")]]

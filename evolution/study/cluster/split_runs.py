@@ -1,4 +1,4 @@
-"""Split runs: one run at a time here, with its trials simulated on workers."""
+"""Split runs: one run at a time here, with its trials in MuJoCo on workers."""
 
 import math
 import threading
