@@ -12,8 +12,10 @@ from matplotlib.legend import Legend
 
 from epuck_mj.constants import TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
+from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.table import RUNGS
+from epuck_mj.scene.model_files import MODELS
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.motors import Speeds
 from evolution.gap import worlds as gap_worlds
@@ -340,3 +342,30 @@ def test_every_arena_of_the_worlds_is_shipped():
             [FOLLOWER], [replace(HOME, arena=arena)], "epuck_kinematic", 2, 1
         )
         assert 0 <= found.fitness <= 1
+
+
+def test_where_the_kinematic_robot_cannot_drive_wheels_are_enough(
+    tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr("evolution.gap.gap_folder.write_gap", lambda *told: asked(told))
+    driven: list[str] = []
+
+    def asked(told: tuple) -> None:
+        driven.extend(told[2])
+        (told[0] / "gap.md").write_text("")
+
+    arena = tmp_path / "leaning.xml"
+    leaning = '<geom name="mast" type="cylinder" size=".02 .1" euler="20 0 0"/>'
+    square = (MODELS / "arena.xml").read_text()
+    arena.write_text(square.replace("</worldbody>", f"{leaning}</worldbody>"))
+    shipped = load_controller(CHAMPION)
+    there = replace(shipped, origin=replace(shipped.origin, arena=str(arena)))
+    (tmp_path / "champion.json").write_text(there.to_json())
+    arguments = [str(tmp_path / "champion.json"), "--output", str(tmp_path / "gap")]
+    assert measure_gap(arguments) == 0
+    assert driven == ["epuck"]
+    said = capsys.readouterr().err
+    assert said.startswith("not driven on epuck_kinematic: arena '")
+    assert said.count("\n") == 1
+    with pytest.raises(UserError, match="'mast' has no exact outline"):
+        measure_gap([*arguments, "--robot", "epuck_kinematic"])

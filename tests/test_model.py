@@ -319,3 +319,10 @@ def test_wheels_need_a_floor_and_the_planar_robot_none(tmp_path):
     path.write_text(WALLS.replace(FLOOR, ""))
     assert "has no floor for the robot's wheels" in refusal("epuck", path)
     assert load_scene("epuck_planar", str(path)).model.nq == 3
+
+
+def test_a_file_with_the_kinematic_robots_name_is_refused(tmp_path):
+    path = tmp_path / "epuck_kinematic.xml"
+    path.write_text((MODELS / "epuck.xml").read_text())
+    with pytest.raises(UserError, match="expected another file name"):
+        load_scene(str(path), "arena")

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from epuck_mj.errors import UserError
 from epuck_mj.host.files import find, is_file
 
 _HERE = Path(__file__).resolve().parent.parent
@@ -30,8 +31,13 @@ def find_robot(name: str) -> Path:
     """The file of a shipped robot, or the user's own.
 
     Raises:
-        UserError: if there is none.
+        UserError: if there is none, or its name would make it the kinematic robot.
     """
+    if name != KINEMATIC_ROBOT and Path(name).stem == KINEMATIC_ROBOT:
+        raise UserError(
+            f"robot '{name}': expected another file name; '{KINEMATIC_ROBOT}' is the "
+            "shipped robot that is simulated without MuJoCo"
+        )
     by_name = {
         # the same robot, simulated in another way
         KINEMATIC_ROBOT: MODELS / "epuck.xml",

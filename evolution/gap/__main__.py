@@ -1,5 +1,6 @@
 """Champions in other worlds: `python -m evolution.gap PATH... --output FOLDER`."""
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Annotated
 
 import tyro
 
+from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import check_threads, main, parse, word
 from epuck_mj.host.files import check_writable, writing
 from epuck_mj.host.limits import check_flag
@@ -52,7 +54,15 @@ def measure_gap(argv: Sequence[str]) -> int:
     from evolution.gap.gap_folder import write_gap
     from evolution.gap.outcomes import check_homes
 
-    check_homes(policies, robots)
+    try:
+        check_homes(policies, robots)
+    except UserError as problem:
+        if options.robot:
+            raise
+        # on wheels only, where that is possible
+        robots = [WHEELED_ROBOT]
+        check_homes(policies, robots)
+        print(f"not driven on {KINEMATIC_ROBOT}: {problem}", file=sys.stderr)
     with writing():
         options.output.mkdir(parents=True, exist_ok=True)
     check_writable(options.output / "gap.md")

@@ -40,6 +40,7 @@ def check_homes(policies: Sequence[NamedPolicy], robots: Sequence[str]) -> None:
         for policy in policies:
             scene = load_scene(robot, policy.arena, policy.task.control_step)
             FreeSpace(scene, policy.start_clearance)
+            robots_in(scene, 1)
 
 
 def ideal(
