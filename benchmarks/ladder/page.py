@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.ladder.controllers import CHAMPION, Tried
 from epuck_mj.host import files
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT
 from epuck_mj.show import colors
 from epuck_mj.show.colors import fraction
 from epuck_mj.show.pictures import save_figure
@@ -20,7 +21,9 @@ Column = Mapping[str, Sequence[float]]
 
 SETS: Mapping[str, Callable[[Tried], bool]] = {
     "all": lambda each: True,
-    "champions": lambda each: each.kind == CHAMPION,
+    "shipped champions": lambda each: (
+        each.kind == CHAMPION and each.evolved_on != KINEMATIC_ROBOT
+    ),
     "champions of wheels": lambda each: (
         (each.kind, each.evolved_on) == (CHAMPION, "epuck")
     ),
