@@ -12,7 +12,7 @@ run: $(INSTALLED)
 	@if [ -f $(RUN)/config.yaml ]; then \
 	  $(BIN)/python -m evolution.run --resume $(RUN); \
 	else \
-	  echo "This takes about 3 minutes on two cores."; \
+	  echo "This takes about 2 minutes on two cores."; \
 	  $(BIN)/python -m evolution.run --output $(RUN); \
 	fi
 

@@ -1,6 +1,7 @@
 """Figures: what is drawn is what was measured; files are sound and repeatable."""
 
 import dataclasses
+import io
 
 import mujoco
 import numpy as np
@@ -77,7 +78,7 @@ def test_a_climb_is_marked():
     figure = fitness_figure(EVALUATIONS, best, best, "DE", climbed=700)
     *_, mark = figure.axes[0].lines
     assert np.unique(mark.get_xdata()).tolist() == [700]
-    assert legend_texts(figure)[-1] == "on wheels from here"
+    assert legend_texts(figure)[-1] == "then on wheels"
 
 
 def test_one_generation_is_enough(tmp_path):
@@ -207,3 +208,12 @@ def test_literal_fitness_is_named(scene, trajectories):
     task = dataclasses.replace(TASK, fitness="literal")
     figure = trajectory_figure(scene, trajectories, task, ["a", "b"])
     assert figure.axes[-1].get_ylabel() == "step fitness (literal)"
+
+
+def test_the_legend_of_a_run_that_climbed_is_whole():
+    figure = fitness_figure([10, 20, 30], [1, 2, 3], [0, 1, 2], "a run", climbed=20)
+    figure.savefig(io.BytesIO(), format="png")
+    (legend,) = figure.legends
+    box = legend.get_window_extent()
+    assert box.x0 >= 0
+    assert box.x1 <= figure.bbox.x1

@@ -74,7 +74,7 @@ def fitness_figure(
     axes.plot(evaluations, best, color=BLUE, label="best of the generation")
     axes.plot(evaluations, mean, color=VERMILION, lw=1, label="mean of the population")
     if climbed is not None:
-        axes.axvline(climbed, color="0.4", lw=1, ls=":", label="on wheels from here")
+        axes.axvline(climbed, color="0.4", lw=1, ls=":", label="then on wheels")
     axes.set(
         title=title,
         xlabel="individual evaluations",
@@ -85,7 +85,7 @@ def fitness_figure(
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.9", lw=0.6)
-    figure.legend(loc="outside lower center", ncols=3, frameon=False)
+    figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize="small")
     return figure
 
 
