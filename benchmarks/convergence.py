@@ -22,6 +22,7 @@ from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.robot_parts import PREFIX
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import (
     START_CLEARANCE,
@@ -74,7 +75,7 @@ class Configuration:
         model.opt.cone, model.opt.solver = self.cone, self.solver
         if self.support_gap is not None:
             for name in ("support_front", "support_rear"):
-                geom = model.geom(name)
+                geom = model.geom(PREFIX + name)
                 geom.pos[2] = geom.size[0] + self.support_gap
         return replace(scene, model=model)
 

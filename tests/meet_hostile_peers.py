@@ -54,6 +54,10 @@ class Meeting:
         return stands and self.ended <= ENDS
 
 
+class NeverDrove(Exception):
+    """A bridge ended before its peer went wrong: this machine was busy."""
+
+
 def meet(name: str, link: str, interrupt: bool) -> Meeting:
     """Let a bridge drive a robot that goes wrong.
 
@@ -61,6 +65,9 @@ def meet(name: str, link: str, interrupt: bool) -> Meeting:
         name: of the peer.
         link: one of its links.
         interrupt: whether SIGINT comes with the fault.
+
+    Raises:
+        NeverDrove: if the bridge ends before the fault.
     """
     peer = PEERS[name]
     with (
@@ -73,7 +80,8 @@ def meet(name: str, link: str, interrupt: bool) -> Meeting:
     ):
         began = time.monotonic()
         while hostile.fault is None:
-            assert process.poll() is None, process.communicate()
+            if process.poll() is not None:
+                raise NeverDrove(process.communicate()[1].strip())
             assert time.monotonic() < began + PATIENCE, "it never drove"
             time.sleep(0.001)
         asked = hostile.fault
@@ -93,9 +101,19 @@ def meet(name: str, link: str, interrupt: bool) -> Meeting:
     )
 
 
+def _met(name: str, link: str, interrupt: bool) -> Meeting:
+    """See `meet`; tried again, twice at the most."""
+    for _ in range(2):
+        try:
+            return meet(name, link, interrupt)
+        except NeverDrove as problem:
+            print(f"{name} on {link}: again, {problem}", file=sys.stderr)
+    return meet(name, link, interrupt)
+
+
 def row(name: str, link: str) -> tuple[str, bool]:
     """A peer's line of the table, and whether the bridge keeps all limits."""
-    fault, asked = (meet(name, link, interrupt) for interrupt in (False, True))
+    fault, asked = (_met(name, link, interrupt) for interrupt in (False, True))
     stood = "nobody there" if fault.stood is None and fault.gone else "NEVER"
     if fault.stood is not None:
         stood = f"{fault.stood:.2f}"

@@ -7,9 +7,11 @@ import pytest
 from benchmarks import convergence
 from benchmarks.convergence import (
     REFINEMENT,
+    STEPS,
     TASK,
     TOLERANCE,
     Configuration,
+    configurations,
     controllers,
     deviation,
     held_out_starts,
@@ -81,3 +83,11 @@ def test_a_coarse_step_is_told_apart(step, fitness):
     starts = held_out_starts(coarse, N_STARTS)
     spoilt = mean_fitness(coarse, chosen(), starts)
     assert deviation(spoilt, fitness["epuck"]) > 2 * TOLERANCE
+
+
+def test_every_configuration_can_be_made():
+    for robot in STEPS:
+        for configuration in configurations(robot, 0.01):
+            scene = configuration.scene(robot)
+            assert scene.model.opt.timestep == configuration.timestep
+            assert scene.n_substeps == round(TASK.control_step / configuration.timestep)
