@@ -7,7 +7,6 @@ import pytest
 from benchmarks import convergence
 from benchmarks.convergence import (
     REFINEMENT,
-    STEPS,
     TASK,
     TOLERANCE,
     Configuration,
@@ -86,7 +85,7 @@ def test_a_coarse_step_is_told_apart(step, fitness):
 
 
 def test_every_configuration_can_be_made():
-    for robot in STEPS:
+    for robot in convergence.STEPS:
         for configuration in configurations(robot, 0.01):
             scene = configuration.scene(robot)
             assert scene.model.opt.timestep == configuration.timestep
