@@ -47,6 +47,7 @@ class Judges:
         """Start without judges; `threads` step the robots, 0 is one per core."""
         self._threads = threads
         self._made: dict[tuple[str, Setting], Judge] = {}
+        self._refused: dict[tuple[str, Setting], str | None] = {}
 
     def add(self, robot: str, setting: Setting, scene: Scene, space: FreeSpace) -> None:
         """Add a judge that uses an existing scene and free space.
@@ -84,12 +85,14 @@ class Judges:
         """
         if robot != KINEMATIC_ROBOT:
             return None
-        scene = self.of(robot, setting).scene
-        try:
-            robots_in(scene, 1, self._threads)
-        except UserError as problem:
-            return f"not tested on {robot}: {problem}"
-        return None
+        if (robot, setting) not in self._refused:
+            refusal, scene = None, self.of(robot, setting).scene
+            try:
+                robots_in(scene, 1, self._threads)
+            except UserError as problem:
+                refusal = f"not tested on {robot}: {problem}"
+            self._refused[robot, setting] = refusal
+        return self._refused[robot, setting]
 
     def refusals(self, robot: str, setting: Setting) -> list[str]:
         """Why champions are not tested on some robots of `tested_on`, a line each."""
