@@ -26,7 +26,7 @@ bench: $(INSTALLED)
 	$(BIN)/python -m benchmarks.throughput --json results/throughput.json
 	$(BIN)/python -m benchmarks.whole_run --json results/whole_run.json
 
-# how true each robot is: about an hour on two cores; it goes on where it was stopped
+# how far the robots agree: about an hour on two cores; it goes on where it was stopped
 ladder: $(INSTALLED)
 	$(BIN)/python -m benchmarks.ladder
 

@@ -15,8 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.convergence import CHAMPIONS
 from epuck_mj.policies.file import load_controller
-from epuck_mj.policies.network import Network
+from epuck_mj.policies.network import Controller, Network
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.conditions import Conditions
@@ -25,8 +26,8 @@ from evolution.judging.evaluation import BatchEngine, Work
 from evolution.judging.held_out_starts import held_out_disturbances
 from evolution.settings.randomness import Purpose
 
-CHAMPION = Path("results/paper/de-best/seed-1")
-"""It drives along walls nearly all the time, and crashes in a hundredth of trials."""
+CHAMPION = CHAMPIONS / "seed-1"
+"""It drives along walls nearly all the time."""
 
 N_TRIALS = 1500
 N_ON_WHEELS = 150
@@ -133,14 +134,18 @@ def _works(scene: Scene, n: int) -> Callable[[Conditions | None], Work]:
     return work
 
 
+def circling(n: int) -> Controller:
+    """Controllers that drive circles of 3 to 5 cm at a third of full speed."""
+    genomes = np.zeros((n, Network().n_genes))
+    genomes[:, 32:36] = -0.35
+    genomes[:, 36:] = np.random.default_rng(1).uniform(0.2, 0.3, (n, 1))
+    return Network().decode(genomes)
+
+
 def _circles(scene: Scene) -> Work:
     """Small circles in the middle, out of reach of walls."""
-    rng = np.random.default_rng(1)
-    genomes = np.zeros((N_TRIALS, Network().n_genes))
-    genomes[:, 32:36] = -0.35
-    genomes[:, 36:] = rng.uniform(0.2, 0.3, (N_TRIALS, 1))
-    starts = FreeSpace(scene, 0.2).sample(rng, N_TRIALS)
-    return Work(Network().decode(genomes), starts)
+    starts = FreeSpace(scene, 0.2).sample(np.random.default_rng(2), N_TRIALS)
+    return Work(circling(N_TRIALS), starts)
 
 
 def _in_rooms(work: Work, n: int) -> Work:

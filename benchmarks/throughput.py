@@ -25,9 +25,9 @@ import numpy as np
 import tyro
 from dm_control.rl import control
 
-from benchmarks.kinematic import measure_kinematic
+from benchmarks.kinematic import circling, measure_kinematic
 from epuck_mj.environments.dm_control import FollowWalls, environment
-from epuck_mj.policies.network import Controller, Network
+from epuck_mj.policies.network import Controller
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters
@@ -91,7 +91,7 @@ def measure(robot: str, repeats: int) -> dict[str, float]:
     # small circles: no robot crashes
     task = TaskParameters(steps=100)
     starts = FreeSpace(scene, 0.12).sample(np.random.default_rng(0), N_ROBOTS)
-    controller = Network().decode(_harmless(N_ROBOTS))
+    controller = circling(N_ROBOTS)
     one, two = (BatchEngine(scene, task, threads) for threads in (1, 2))
     whole, n_substeps = TaskParameters(), scene.n_substeps
     env = environment(scene, FollowWalls(scene, whole, starts=itertools.cycle(starts)))
@@ -126,14 +126,6 @@ def _rate(work: Callable[[], int]) -> Rate:
     n_steps = work()
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     return Rate(n_steps / wall, n_steps / cpu)
-
-
-def _harmless(n: int) -> np.ndarray:
-    """Genomes that drive circles of 3 to 5 cm at a third of full speed."""
-    genomes = np.zeros((n, Network().n_genes))
-    genomes[:, 32:36] = -0.35
-    genomes[:, 36:] = np.random.default_rng(1).uniform(0.2, 0.3, (n, 1))
-    return genomes
 
 
 def _mj_step(scene: Scene, n_steps: int = 50_000) -> int:

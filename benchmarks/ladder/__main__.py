@@ -1,4 +1,4 @@
-"""How true each rung is: `python -m benchmarks.ladder`, or `make ladder`.
+"""How far the robots agree: `python -m benchmarks.ladder`, or `make ladder`.
 
 Controllers drive from the same starts on each rung and on the reference: the robot on
 wheels with a fifth of its physics step. Figures are written as they are measured; a
@@ -12,24 +12,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
+from benchmarks.convergence import REFINEMENT, held_out_starts
 from benchmarks.ladder.controllers import tried
 from benchmarks.ladder.page import REFERENCE, write_page
 from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.model import Scene, load_scene
-from epuck_mj.scene.starts import FreeSpace
-from epuck_mj.step.control import START_CLEARANCE, run_trials
+from epuck_mj.step.control import run_trials
 
 ARENAS = {"arena": 1, "l_shape": 3, "pillars": 3, "octagon": 3}
 """Arenas; every controller is measured there (1), or every third one (3)."""
-
-REFINEMENT = 5
-"""The reference's physics step is this many times shorter."""
-
-START_SEED = 2026
 
 
 def _reference(arena: str) -> Scene:
@@ -90,14 +83,10 @@ def ladder(argv: Sequence[str]) -> int:
     _save(options.json, found)
     for arena, every in ARENAS.items():
         n = options.starts if every == 1 else options.starts // 4
+        starts = held_out_starts(load_scene("epuck", arena), n)
         for name, scene_in in COLUMNS.items():
             column = found.setdefault(arena, {}).setdefault(name, {})
-            scene = scene_in(arena)
-            # the same on all rungs
-            starts = FreeSpace(load_scene("epuck", arena), START_CLEARANCE).sample(
-                np.random.default_rng(START_SEED), n
-            )
-            robots = robots_in(scene, n, options.threads)
+            robots = robots_in(scene_in(arena), n, options.threads)
             for each in controllers[::every]:
                 if each.name not in column:
                     trials = run_trials(robots, each.policy(n), starts, each.task)

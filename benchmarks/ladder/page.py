@@ -147,7 +147,7 @@ def ladder_figure(columns: Mapping[str, Column]) -> Figure:
     return figure
 
 
-HEADER = """# How true each robot is
+HEADER = """# How far the robots agree
 
 Made by `make ladder`. {n} controllers drive from the same {starts} starts on each robot
 and on the reference: the robot on wheels with a fifth of its physics step, where a
