@@ -180,11 +180,7 @@ def test_an_edited_champion(what, kind, request, tmp_path, capsys):
     change, words = CHAMPION[what]
     run = request.getfixturevalue(kind)
     lines = verdict(edited(run, tmp_path, "champion.json", change), capsys)
-    expected = [words]
-    if (what, kind) == ("gene", "shipped"):
-        # it may be of the last population, which a copy does not have
-        expected.append("scores.held_out.epuck: ")
-    assert any(words in line for line in lines for words in expected), lines
+    assert any(words in line for line in lines), lines
     assert all(line.startswith("  champion.json, ") for line in lines)
 
 
