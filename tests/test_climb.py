@@ -163,7 +163,7 @@ def test_finalists_are_compared_on_wheels(monkeypatch, finalists):
         Watched(scene, c.task, seen) for scene in (evolution.scene, evolution._wheels)
     )
     champion = choose_champion(cheap, evolution, stored_by(evolution), wheels)
-    everybody = len(candidates(stored_by(evolution), share=1.0)[0])
+    everybody = len(candidates(stored_by(evolution))[0])
     assert everybody >= 8
     expected = [("epuck_kinematic", everybody * 6), ("epuck_kinematic", 8 * 10)]
     if everybody > 8:

@@ -84,6 +84,8 @@ COMMON = {
     "climb": 0.9,
     "arena": "arena",
     "trials": 5,
+    "starts_every": 1,
+    "own_starts": False,
     "steps": 300,
     "control_step": 0.1,
     "fitness": "product",

@@ -399,6 +399,35 @@ def test_starts_differ_between_generations_seeds_and_purposes():
     assert len(np.unique(poses[:, 0])) == len(poses) == 3 * 3 * 5 + 200 + 1000
 
 
+@pytest.mark.parametrize("every", [2, 3])
+def test_starts_may_last_for_some_generations(every):
+    starts = starts_of(
+        Evolution(tiny("ga", steps=2, starts_every=every, evaluations=48)), 6
+    )
+    new = starts_of(Evolution(tiny("ga", steps=2)), 2)
+    for generation, dealt in enumerate(starts):
+        assert np.array_equal(dealt, starts[generation - generation % every])
+    assert np.array_equal(starts[every], new[1])
+
+
+@pytest.mark.parametrize("robot", ["epuck_kinematic", "epuck"])
+def test_individuals_may_have_starts_of_their_own(robot):
+    config = tiny("de-rand", steps=30, trials=3, own_starts=True, robot=robot)
+    experiment = Evolution(config, threads=1)
+    watched, run = watch(experiment), experiment.run()
+    for _ in range(2):
+        next(run)
+    seen = np.concatenate([starts for _, starts, _ in watched.calls])
+    assert len(np.unique(seen, axis=0)) == len(seen) == 2 * 8 * 3
+    # and are evaluated on these: each alone
+    controller, starts, trials = watched.calls[0]
+    for i in range(8 * 3):
+        alone, _, _ = slow_trial(
+            experiment.scene, controller[i : i + 1], starts[i], config.task
+        )
+        assert trials.fitness[i] == alone
+
+
 @pytest.mark.parametrize(
     ("draw", "n"), [(starts_for_validation, 200), (starts_for_test, 1000)]
 )

@@ -275,7 +275,7 @@ class Needy:
         ("--fitness no_module_here:f", "cannot import 'no_module_here'"),
         ("--fitness bad.py:other", "no 'other' in '.*bad.py'; available: np, fails, "),
         ("--fitness bad.py:", "expected file.py:name or package.module:name"),
-        ("--fitness sum", "expected product, literal or my.py:name, got 'sum'"),
+        ("--fitness sum", "expected product, literal, spaced or my.py:name, got 'sum'"),
         ("--fitness bad.py:number", "expected a function, got 3"),
         ("--fitness bad.py:wordy", "expected a number as its maximum, got 'much'"),
         ("--fitness bad.py:fails", "failed in line 3 with AttributeError"),

@@ -5,7 +5,14 @@ import pytest
 
 from epuck_mj.errors import UserError
 from epuck_mj.step.control import TaskParameters
-from epuck_mj.step.fitness import FORMULAS, literal, of_most, product, step_fitness
+from epuck_mj.step.fitness import (
+    FORMULAS,
+    literal,
+    of_most,
+    product,
+    spaced,
+    step_fitness,
+)
 
 
 def seen(nearest: float) -> np.ndarray:
@@ -33,6 +40,17 @@ def test_by_hand(v, w, nearest, by_prose, as_printed):
     assert literal(action, seen(nearest)) == pytest.approx(as_printed)
 
 
+@pytest.mark.parametrize(
+    ("millimetres", "expected"),
+    [(0, 0), (4, 0.5), (8, 1), (12, 1), (15, 1), (27.5, 0.5), (40, 0)],
+)
+def test_a_distance_to_the_wall_pays_most(millimetres, expected):
+    observation = seen(millimetres / 40)
+    assert spaced(np.array([1.0, 0.0]), observation) == pytest.approx(expected)
+    half = spaced(np.array([0.5, -0.5]), observation)
+    assert half == pytest.approx(0.25 * expected)
+
+
 @pytest.mark.parametrize("name", FORMULAS)
 def test_a_share_of_one_for_any_batch(name):
     rng = np.random.default_rng(0)
@@ -47,7 +65,7 @@ def test_a_share_of_one_for_any_batch(name):
 
 
 def test_unknown_names_are_refused():
-    with pytest.raises(UserError, match="'prose'; available: literal, product, or my"):
+    with pytest.raises(UserError, match="'prose'; available: literal, product, spaced"):
         step_fitness("prose")
 
 

@@ -52,9 +52,35 @@ def test_the_square_is_filled_evenly(scene):
         assert scipy.stats.kstest(values, uniform.cdf).pvalue > 0.01
 
 
-def test_no_start_touches_anything(scene):
+def test_spread_starts_are_more_even_than_random_ones(scene):
+    """Means over 200 of them are nearer to the means over all starts."""
+    space, reach = FreeSpace(scene, CLEARANCE), 0.5 - BODY_RADIUS - CLEARANCE
+
+    def errors(draw) -> np.ndarray:
+        x, y, yaw = np.moveaxis(
+            [draw(np.random.default_rng(i), 200) for i in seeds], 2, 0
+        )
+        # way to the nearest wall, and to the wall at x = reach straight ahead
+        nearest = reach - np.maximum(abs(x), abs(y))
+        facing = np.where(abs(yaw) < np.pi / 3, reach - x, 0)
+        off = [np.mean(nearest, 1) - reach / 3, np.mean(facing, 1) - reach / 3]
+        return np.sqrt(np.mean(np.square(off), 1))
+
+    seeds = range(20)
+    assert (errors(space.spread) < 0.5 * errors(space.sample)).all()
+
+
+def test_a_longer_list_of_spread_starts_begins_with_the_shorter(scene):
+    space = FreeSpace(scene, CLEARANCE)
+    long, short = (space.spread(np.random.default_rng(5), n) for n in (300, 70))
+    np.testing.assert_array_equal(long[:70], short)
+    assert not np.array_equal(short, space.spread(np.random.default_rng(6), 70))
+
+
+@pytest.mark.parametrize("draw", [FreeSpace.sample, FreeSpace.spread])
+def test_no_start_touches_anything(scene, draw):
     """MuJoCo's own distance from the shell to each wall, one by one."""
-    starts = FreeSpace(scene, CLEARANCE).sample(np.random.default_rng(1), 200)
+    starts = draw(FreeSpace(scene, CLEARANCE), np.random.default_rng(1), 200)
     model, data = scene.model, mujoco.MjData(scene.model)
     walls = [g for g in range(model.ngeom) if model.geom(g).name.startswith("wall")]
     shell = model.geom("epuck/shell").id

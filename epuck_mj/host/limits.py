@@ -77,6 +77,7 @@ LIMITS: Mapping[str, Limit] = MappingProxyType(
         "climb": _above_0(1),
         "finalists": Limit(0, 1000),
         "trials": COUNT,
+        "starts_every": Limit(1, 100_000_000),
         "steps": Limit(1, 10_000_000),
         "control_step": _above_0(10, "s"),
         # an e-puck drives at most 0.1288 m/s and turns at most 4.86 rad/s

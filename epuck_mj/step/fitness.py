@@ -1,9 +1,10 @@
 """Step fitness: what a control step is worth.
 
-Both shipped forms read equation (2) of the paper. Its prose ("maximize linear velocity
+Two shipped forms read equation (2) of the paper. Its prose ("maximize linear velocity
 while minimizing both the angular velocity and robot-distance to the wall") is
 `product`; its print, where closeness only softens the price of turning, is
-`literal`, whose optimum is driving circles far from any wall. Another one is a
+`literal`, whose optimum is driving circles far from any wall. The third form, `spaced`,
+is not the paper's: it pays most for some distance from the wall. Another one is a
 function in a file of the user's, `my.py:name`.
 """
 
@@ -119,6 +120,20 @@ def close(observation: np.ndarray) -> np.ndarray:
     return 1.0 - observation.min(axis=-1)
 
 
+SPACED_NEAR, SPACED_FAR = 0.2, 0.375
+"""Nearest readings between which `spaced` pays most: 8 and 15 mm of a range of 4 cm."""
+
+
+def at_distance(observation: np.ndarray) -> np.ndarray:
+    """How well a robot keeps its distance to the nearest thing seen, `(...,)`.
+
+    1 from `SPACED_NEAR` to `SPACED_FAR`; it falls to 0 at contact and when free.
+    """
+    nearest = observation.min(axis=-1)
+    outside = (1.0 - nearest) / (1.0 - SPACED_FAR)
+    return np.minimum(np.minimum(nearest / SPACED_NEAR, outside), 1.0)
+
+
 def product(action: np.ndarray, observation: np.ndarray) -> np.ndarray:
     """Fast, straight and close to a wall, all at once, `(...,)`.
 
@@ -134,10 +149,19 @@ def literal(action: np.ndarray, observation: np.ndarray) -> np.ndarray:
     return fast(action) * (1.0 - turning(action) * close(observation))
 
 
+def spaced(action: np.ndarray, observation: np.ndarray) -> np.ndarray:
+    """Fast, straight and at some distance from a wall, `(...,)`.
+
+    As `product`, but instead of contact it pays most where the nearest reading is from
+    `SPACED_NEAR` to `SPACED_FAR`. Arguments as for `product`.
+    """
+    return fast(action) * (1.0 - turning(action)) * at_distance(observation)
+
+
 Formula = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 FORMULAS: MappingProxyType[str, Formula] = MappingProxyType(
-    {"product": product, "literal": literal}
+    {"product": product, "literal": literal, "spaced": spaced}
 )
 """The shipped forms, of action and observation; none is worth more than 1 a step."""
 

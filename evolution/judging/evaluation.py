@@ -222,22 +222,23 @@ def evaluate(
     to_beat: np.ndarray | None = None,
     disturbances: Disturbances | None = None,
 ) -> Evaluation:
-    """Evaluate all individuals on all starts.
+    """Evaluate all individuals, on the same starts or each on its own.
 
     Args:
         engine: what runs the trials.
         topology: what genomes decode to.
         genomes: `(individuals, genes)`.
-        starts: poses `(trials, 3)`, x, y [m], yaw [rad], for all individuals.
+        starts: poses `(trials, 3)`, x, y [m], yaw [rad], for all individuals; or
+            `(individuals, trials, 3)`, each one's own.
         to_beat: fitness `(individuals,)` that each has to exceed to matter; None if
             every fitness matters.
         disturbances: of the trials, for all individuals; None for ideal robots.
     """
-    shape = (len(genomes), len(starts))
-    controller = topology.decode(np.repeat(genomes, len(starts), axis=0))
-    race = None if to_beat is None else Race(to_beat, len(starts))
+    shape = (len(genomes), starts.shape[-2])
+    controller = topology.decode(np.repeat(genomes, shape[1], axis=0))
+    race = None if to_beat is None else Race(to_beat, shape[1])
     everybody = None if disturbances is None else disturbances.tiled(len(genomes))
-    everywhere = np.tile(starts, (len(genomes), 1))
+    everywhere = np.broadcast_to(starts, (*shape, 3)).reshape(-1, 3)
     trials = engine.run(Work(controller, everywhere, race, everybody))
     return Evaluation(
         trials.fitness.reshape(shape),

@@ -1,6 +1,7 @@
 """Held-out starts: those on which champions are chosen, and those of their tests.
 
-Both sets are fixed, the same for all runs, and never used in evolution.
+Both sets are fixed, the same for all runs, spread evenly over the arena, and never used
+in evolution.
 """
 
 from typing import TYPE_CHECKING
@@ -21,12 +22,12 @@ HELD_OUT_SEED = 0
 
 def starts_for_validation(space: "FreeSpace", n: int = N_VALIDATION) -> np.ndarray:
     """The first `n` of the starts on which champions are chosen, `(n, 3)`."""
-    return space.sample(random_generator(HELD_OUT_SEED, Purpose.VALIDATION), n)
+    return space.spread(random_generator(HELD_OUT_SEED, Purpose.VALIDATION), n)
 
 
 def starts_for_test(space: "FreeSpace", n: int = N_TEST) -> np.ndarray:
     """The first `n` of the starts on which champions are tested, `(n, 3)`."""
-    return space.sample(random_generator(HELD_OUT_SEED, Purpose.TEST), n)
+    return space.spread(random_generator(HELD_OUT_SEED, Purpose.TEST), n)
 
 
 def held_out_disturbances(

@@ -101,10 +101,12 @@ class Believed(_Record, frozen=True):
     Attributes:
         stored: that fitness.
         held_out: its mean on the test starts, on ideal robots.
+        robot: on which it evolved and was tested; empty if unknown.
     """
 
     stored: Score
     held_out: Score
+    robot: str = ""
 
 
 class Scores(_Record, frozen=True):

@@ -5,6 +5,7 @@ compared on validation starts and the winner is reported on test starts; both se
 fixed, the same for all runs, and never used in evolution.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,17 +19,17 @@ from evolution.judging.held_out_starts import (
 from evolution.run.generation_loop import Evolution
 from evolution.settings.randomness import Purpose
 
-BEST_OF_POPULATION = 0.1
-"""Share of the final population whose members are candidates."""
-
 LATEST_BEST = 20
 """Number of the latest best-so-far individuals that are candidates."""
 
 SCREENED = 10
-"""Number of the best on the kinematic robot that are tested on more starts there."""
+"""Number of candidates that are left after the first round."""
 
 N_SCREENING = 1000
-"""Number of these starts."""
+"""Number of starts of their second round on the kinematic robot."""
+
+FIRST_SHARE = 0.1
+"""Share of the starts of the first round in MuJoCo, where all have to be simulated."""
 
 
 @dataclass(frozen=True)
@@ -75,18 +76,13 @@ def stored_by(evolution: Evolution) -> Stored:
     )
 
 
-def candidates(
-    stored: Stored, share: float = BEST_OF_POPULATION
-) -> tuple[np.ndarray, np.ndarray]:
+def candidates(stored: Stored) -> tuple[np.ndarray, np.ndarray]:
     """Genomes `(n, genes)` of the candidates and their stored fitness `(n,)`.
 
-    Args:
-        stored: what a run stored.
-        share: of the final population whose members are candidates.
+    The whole final population, the best first, and the latest of the best so far.
     """
     population, fitness, best = stored.population, stored.fitness, stored.best
-    n_best = max(1, round(share * len(population)))
-    order = np.argsort(-fitness, kind="stable")[:n_best]
+    order = np.argsort(-fitness, kind="stable")
     # the generations that raised the run's best
     before = np.concatenate([[-np.inf], np.maximum.accumulate(best)[:-1]])
     raised = np.flatnonzero(best > before)[-LATEST_BEST:]
@@ -111,9 +107,9 @@ def choose_champion(
 ) -> Champion:
     """The candidate with the highest mean on validation starts.
 
-    On the kinematic robot trials cost next to nothing, so all of the final population
-    are candidates, and the best are tested on more starts. The best of these are
-    compared on wheels.
+    All candidates have a first round, and the best of them a second one: the same for
+    every algorithm. On the kinematic robot, where trials cost next to nothing, that is
+    on more starts, and the best few of these are compared on wheels.
 
     Args:
         engine: of the robot that evolution began with.
@@ -123,20 +119,21 @@ def choose_champion(
     """
     config = evolution.config
     n = config.validation_starts
-    if config.robot != KINEMATIC_ROBOT:
-        genomes, believed = candidates(stored)
-        return _best(genomes, believed, _validated(engine, evolution, genomes, n))
-    genomes, believed = candidates(stored, share=1.0)
-    rounds = [(engine, n, SCREENED), (engine, max(n, N_SCREENING), config.finalists)]
-    if config.finalists and wheels is not None:
-        rounds.append((wheels, n, 1))
+    if config.robot == KINEMATIC_ROBOT:
+        second = max(n, N_SCREENING)
+        rounds = [(engine, n, SCREENED), (engine, second, config.finalists)]
+        if config.finalists and wheels is not None:
+            rounds.append((wheels, n, 1))
+    else:
+        rounds = [(engine, math.ceil(n * FIRST_SHARE), SCREENED), (engine, n, 1)]
+    genomes, believed = candidates(stored)
     fitness = believed
     for judge, starts, kept in rounds:
         fitness = _validated(judge, evolution, genomes, starts)
         order = np.argsort(-fitness, kind="stable")[: max(kept, 1)]
         genomes, believed = genomes[order], believed[order]
         fitness = fitness[order]
-    return _best(genomes, believed, fitness)
+    return Champion(genomes[0], float(believed[0]), float(fitness[0]))
 
 
 def _validated(
@@ -150,8 +147,3 @@ def _validated(
         config.conditions, Purpose.VALIDATION, len(starts), config.steps
     )
     return evaluate(engine, config.topology, genomes, starts, disturbances=met).fitness
-
-
-def _best(genomes: np.ndarray, believed: np.ndarray, fitness: np.ndarray) -> Champion:
-    best = int(fitness.argmax())
-    return Champion(genomes[best], float(believed[best]), float(fitness[best]))

@@ -129,18 +129,20 @@ class Evolution:
     def _generation(self) -> Record:
         config = self.config
         generation = self.optimizer.generation
-        starts, met = self.trials(generation)
+        met = self.disturbances(generation)
         climbs = self._climbs_now
         spent, evaluations = self.evaluations, []
         if climbs:
             self.climb()
             known = self.optimizer.population
+            starts = self.starts(generation, len(known))
             anew = evaluate(self.engine, config.topology, known, starts, None, met)
             self.optimizer.judge_anew(anew.fitness)
             spent += len(known)
             evaluations.append(anew)
         genomes = self.optimizer.ask()
         to_beat = self.optimizer.to_beat() if self.racing else None
+        starts = self.starts(generation, len(genomes))
         evaluations.append(
             evaluate(self.engine, config.topology, genomes, starts, to_beat, met)
         )
@@ -162,15 +164,29 @@ class Evolution:
         self.best_genomes.append(self.optimizer.population[fitness.argmax()].copy())
         return record
 
-    def trials(self, generation: int) -> tuple[np.ndarray, Disturbances | None]:
-        """Starts `(trials, 3)` of a generation, and disturbances unless they are ideal.
+    def starts(self, generation: int, individuals: int) -> np.ndarray:
+        """Starts of a generation, the same for every algorithm of that seed.
 
-        The same for every individual, and for every algorithm of that seed.
+        Returns:
+            Poses `(trials, 3)` for all individuals; or, if each has its own,
+            `(individuals, trials, 3)`.
+        """
+        config = self.config
+        key = (Purpose.STARTS, generation // config.starts_every)
+        rng, trials = random_generator(config.seed, *key), config.trials
+        if not config.own_starts:
+            return self.space.sample(rng, trials)
+        return self.space.sample(rng, individuals * trials).reshape(-1, trials, 3)
+
+    def disturbances(self, generation: int) -> Disturbances | None:
+        """Disturbances of a generation's trials, the same for every individual.
+
+        None if its robots are ideal.
         """
         config, key = self.config, (Purpose.STARTS, generation)
-        n, steps, seed = config.trials, config.steps, config.seed
-        starts = self.space.sample(random_generator(seed, *key), n)
-        return starts, disturbances(config.conditions, n, steps, seed, *key)
+        return disturbances(
+            config.conditions, config.trials, config.steps, config.seed, *key
+        )
 
     def state(self) -> dict[str, np.ndarray]:
         """State from which evolution resumes, with the records so far."""

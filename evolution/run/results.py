@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 from epuck_mj.host import files
 from epuck_mj.policies.file import ControllerFile, Origin
@@ -104,15 +105,16 @@ def judged(
         if met is not None:
             tell(f"Testing it with disturbances {where}")
             as_evolved[robot] = judge.test(policy, n, met)
-    # what the run believed its best to be, and what that is worth on an ideal robot
+    # what the run believed its best to be, and what that is worth where it evolved
     tell("Testing the individual of the highest fitness")
     genome, believed = most_believed(stored)
-    worth = next(iter(judges.values())).test(config.topology.decode(genome), n)
+    where = WHEELED_ROBOT if evolution.climbed else Path(config.robot).name
+    worth = judges[where].test(config.topology.decode(genome), n)
     scores = Scores(
         stored=champion.stored_fitness,
         validation=champion.validation_fitness,
         held_out=held_out,
-        most_believed=Believed(stored=believed, held_out=worth.mean),
+        most_believed=Believed(stored=believed, held_out=worth.mean, robot=where),
     )
     if as_evolved:
         scores = scores.model_copy(update={"held_out_as_evolved": as_evolved})

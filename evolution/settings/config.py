@@ -73,6 +73,14 @@ class ExperimentConfig(BaseModel):
     trials: Annotated[int, within("trials")] = Field(
         5, description="trials per individual"
     )
+    starts_every: Annotated[int, within("starts_every")] = Field(
+        1, description="trials get new starts in every so many generations"
+    )
+    own_starts: StrictBool = Field(
+        False,
+        description="give each individual starts of its own, instead of the same to "
+        "all of a generation",
+    )
     steps: Annotated[int, within("steps")] = Field(
         300, description="control steps per trial"
     )
@@ -82,7 +90,8 @@ class ExperimentConfig(BaseModel):
     fitness: FitnessName = Field(
         "product",
         description="step fitness: product (as the paper describes it), literal (the "
-        "paper's equation 2) or my.py:name (a function of your own)",
+        "paper's equation 2), spaced (as product, but it pays most for a distance of 8 "
+        "to 15 mm) or my.py:name (a function of your own)",
     )
     v_max: Annotated[float, within("v_max")] = Field(
         SPEED_MAX, description="forward speed at v = 1 [m/s]"

@@ -38,6 +38,7 @@ from epuck_mj.rungs.kinematic.robots import at_rest, lags, substeps
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.control import TaskParameters, Trials
 from epuck_mj.step.disturbances import Disturbances
+from epuck_mj.step.fitness import SPACED_FAR, SPACED_NEAR
 from epuck_mj.step.motors import STEP_ANGLE
 from epuck_mj.step.sensors import (
     LOG_COUNTS,
@@ -48,7 +49,7 @@ from epuck_mj.step.sensors import (
     sensed_distance,
 )
 
-FITNESS = ("product", "literal")
+FITNESS = ("product", "literal", "spaced")
 """Step fitness forms that are compiled, by their numbers."""
 
 
@@ -284,7 +285,8 @@ def trial(
             states[i, SIN],
             truth,
         )
-        close = 1.0 - observe(truth, task.sensor_range, observation)
+        nearest = observe(truth, task.sensor_range, observation)
+        close = 1.0 - nearest
         if noise.there:
             sensed(
                 gains, table, share, count_noise, which, k + 1, truth, before, distance
@@ -293,8 +295,11 @@ def trial(
         turning = abs(w)
         if task.fitness == 0:
             fitness += v * (1.0 - turning) * close
-        else:
+        elif task.fitness == 1:
             fitness += v * (1.0 - turning * close)
+        else:
+            kept = min(nearest / SPACED_NEAR, close / (1.0 - SPACED_FAR), 1.0)
+            fitness += v * (1.0 - turning) * kept
         if fitness + (task.steps - 1 - k) * task.most < needed:
             return fitness, k + 1, False
     return fitness, task.steps, False

@@ -19,7 +19,6 @@ from evolution.report.measures import shown_robots
 from evolution.report.run_table import control_steps
 from evolution.report.samples import tests_of
 from evolution.run.champion import (
-    BEST_OF_POPULATION,
     LATEST_BEST,
     N_SCREENING,
     SCREENED,
@@ -125,8 +124,7 @@ def _kinematic(data: StudyData) -> bool:
 
 
 def _candidates(data: StudyData) -> str:
-    share = "all" if _kinematic(data) else f"the best {BEST_OF_POPULATION:.0%}"
-    return f"{share} of the last population"
+    return "all of the last population"
 
 
 def _finalists(data: StudyData) -> str:
