@@ -134,6 +134,19 @@ def test_what_experiments_share_wins(here):
     )
 
 
+def test_an_experiment_may_differ_from_another_in_some_keys(here):
+    config = study(
+        "experiments: [ga, {small: {like: ga, trials: 2, optimizer: {bits: 4}}}, "
+        "{other: {like: ga, optimizer: {algorithm: random_search, population: 9}}}]"
+    )
+    ga, small, other = (each.model_dump() for each in config.experiments.values())
+    assert list(config.experiments) == ["ga", "small", "other"]
+    optimizer = ga["optimizer"]
+    assert small == ga | {"trials": 2, "optimizer": optimizer | {"bits": 4}}
+    mine = {"algorithm": "random_search", "population": 9}
+    assert other == ga | {"optimizer": mine}
+
+
 def test_order_is_kept(here):
     config = study("experiments: [ga, de-rand, de-best]")
     assert list(config.experiments) == ["ga", "de-rand", "de-best"]
@@ -170,7 +183,24 @@ def test_a_run_has_its_own_seed_and_nothing_else(here):
         ("experiments: [ga, nope]", ("no experiment 'nope'", "de-rand, ga")),
         ("experiments: [paper]", ("no experiment 'paper'",)),
         ("experiments: [study.yaml]", ("unknown key 'experiments'",)),
-        ("experiments: [3]", ("a list of experiments, got [3]",)),
+        ("experiments: [3]", ("a list of experiments", "differs from another, got 3")),
+        ("experiments: [{a: {}, b: {}}]", ("a name with the keys", "got {'a'")),
+        ("experiments: [{a/b: {like: ga}}]", ("a name of letters", "got 'a/b'")),
+        ("experiments: [{a: {steps: 3}}]", ("study.yaml', a: expected 'like'",)),
+        ("experiments: [{a: ga}]", ("study.yaml', a: expected 'like'", "got 'ga'")),
+        ("experiments: [{a: {like: nope}}]", ("no experiment 'nope'",)),
+        ("experiments: [{a: {like: ga, stps: 3}}]", ("', a: unknown key 'stps'",)),
+        ("experiments: [{a: {like: ga, steps: x}}]", ("', a: steps: ", "got 'x'")),
+        ("experiments: [{a: {like: ga, seed: 2}}]", ("a: 'seed' has no effect",)),
+        (
+            "experiments: [{a: {like: ga, optimizer: 3}}]",
+            ("a: expected 'optimizer', a mapping, got 3",),
+        ),
+        (
+            "experiments: [{a: {like: ga, optimizer: {tournment: 3}}}]",
+            ("', a: unknown key 'optimizer.tournment'",),
+        ),
+        ("experiments: [ga, {ga: {like: ga}}]", ("two experiments are called 'ga'",)),
         ("experiments: [ga, ga]", ("two experiments are called 'ga'",)),
         ("experiments: [ga, ga.yaml]", ("two experiments are called 'ga'",)),
         ("experiments: [ga]\ncommon: []", ("expected 'common', a mapping, got []",)),

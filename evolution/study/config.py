@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Self
+from typing import Any, Self
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import find
@@ -18,6 +18,8 @@ from evolution.settings.config_files import find_config, load_config, shipped_wi
 KEYS = ("experiments", "common")
 
 SEEDS = re.compile(r"(\d{1,18})(?:-(\d{1,18}))?", re.ASCII)
+
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", re.ASCII)
 
 SEEDS_MAX = 10_000
 """Most seeds of one command."""
@@ -47,8 +49,10 @@ class StudyConfig:
     def load(cls, path: Path) -> Self:
         """Read a study from a file with the keys `experiments` and `common`.
 
-        `experiments` is a list of shipped experiments and YAML files. `common` are keys
-        that all of them get, whatever their files say; it may be left out.
+        `experiments` is a list of shipped experiments and YAML files. An entry may also
+        be a mapping of a new name to the key `like`, an experiment, and the keys in
+        which it differs from that. `common` are keys that all of them get, whatever
+        their files say; it may be left out.
 
         Raises:
             UserError: if a file is missing or says something unknown.
@@ -59,15 +63,11 @@ class StudyConfig:
             raise UserError(
                 f"'{path}': unknown key '{unknown[0]}'; available: {', '.join(KEYS)}"
             )
-        names, common = content.get("experiments"), content.get("common")
-        if not (
-            isinstance(names, list)
-            and names
-            and all(isinstance(name, str) for name in names)
-        ):
+        entries, common = content.get("experiments"), content.get("common")
+        if not (isinstance(entries, list) and entries):
             raise UserError(
                 f"'{path}': expected 'experiments', a list of experiments, got "
-                + shown(names)
+                + shown(entries)
             )
         # nothing behind the colon
         common = {} if common is None else common
@@ -80,13 +80,15 @@ class StudyConfig:
                 f"'{path}', common: 'seed' has no effect here: expected --seeds"
             )
         experiments: dict[str, ExperimentConfig] = {}
-        for name in names:
-            file = find_config(name)
-            if file.stem in experiments:
-                raise UserError(f"'{path}': two experiments are called '{file.stem}'")
-            fields = load_config(file).model_dump() | common
+        for entry in entries:
+            name, fields, where = _entry(entry, path)
+            if name in experiments:
+                raise UserError(f"'{path}': two experiments are called '{name}'")
+            # what an entry says is refused under its own name
+            config = ExperimentConfig.parsed(fields, where)
+            fields = config.model_dump() | common
             config = ExperimentConfig.parsed(fields, f"'{path}', common")
-            experiments[file.stem] = config.located()
+            experiments[name] = config.located()
         return cls(MappingProxyType(experiments))
 
     def only(self, names: list[str]) -> Self:
@@ -144,6 +146,49 @@ class StudyConfig:
         if not experiments:
             raise UserError(f"'{path}': expected experiments, got none")
         return cls(MappingProxyType(experiments))
+
+
+def _entry(entry: object, path: Path) -> tuple[str, dict[str, Any], str]:
+    """An experiment's name, its keys and where they stand.
+
+    Args:
+        entry: of the list `experiments`.
+        path: of the study.
+
+    Raises:
+        UserError: if it is no experiment, or its file is missing or says something
+            unknown.
+    """
+    if isinstance(entry, str):
+        file = find_config(entry)
+        return file.stem, load_config(file).model_dump(), f"'{file}'"
+    if not (isinstance(entry, dict) and len(entry) == 1):
+        raise UserError(
+            f"'{path}': expected 'experiments', a list of experiments or of a name "
+            f"with the keys in which it differs from another, got {shown(entry)}"
+        )
+    ((name, keys),) = entry.items()
+    if not (isinstance(name, str) and NAME.fullmatch(name)):
+        raise UserError(
+            f"'{path}': expected a name of letters, digits, dots, dashes and "
+            f"underscores, got {shown(name)}"
+        )
+    where = f"'{path}', {name}"
+    if not (isinstance(keys, dict) and isinstance(keys.get("like"), str)):
+        raise UserError(f"{where}: expected 'like', an experiment, got {shown(keys)}")
+    if "seed" in keys:
+        raise UserError(f"{where}: 'seed' has no effect here: expected --seeds")
+    fields = load_config(find_config(keys["like"])).model_dump()
+    changed = {key: value for key, value in keys.items() if key != "like"}
+    optimizer = changed.pop("optimizer", {})
+    if not isinstance(optimizer, dict):
+        raise UserError(
+            f"{where}: expected 'optimizer', a mapping, got {shown(optimizer)}"
+        )
+    # another algorithm shares no keys with this one
+    if "algorithm" not in optimizer:
+        optimizer = fields["optimizer"] | optimizer
+    return name, fields | changed | {"optimizer": optimizer}, where
 
 
 def find_study(study: str) -> Path:
