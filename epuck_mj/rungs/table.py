@@ -40,14 +40,22 @@ def robots_in(scene: Scene, capacity: int, threads: int = 0) -> Simulator:
 
 
 def compiled_trials(
-    scene: Scene, task: TaskParameters, threads: int = 0
+    scene: Scene, task: TaskParameters, threads: int = 0, late: int = 0
 ) -> CompiledTrials | None:
     """Whole trials of the paper's network in compiled code, with the same bits.
 
     None where there are none: on other rungs, and for a user's own step fitness.
+
+    Args:
+        scene: robot and arena.
+        task: what a trial is.
+        threads: that run trials; 0 is one per core.
+        late: control steps until a command has reached the wheels of ideal robots.
     """
     if scene.name != KINEMATIC_ROBOT:
         return None
     from epuck_mj.rungs.kinematic.fused import FITNESS, FusedTrials
 
-    return FusedTrials(scene, task, threads) if task.fitness in FITNESS else None
+    if task.fitness not in FITNESS:
+        return None
+    return FusedTrials(scene, task, threads, late)

@@ -17,11 +17,13 @@ import numpy as np
 from epuck_mj.policies.network import Controller
 from epuck_mj.policies.topology import Topology
 from epuck_mj.rungs.disturbed import disturbed
+from epuck_mj.rungs.late import with_late_commands
 from epuck_mj.rungs.table import compiled_trials, robots_in
 from epuck_mj.rungs.warnings import unstable
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.control import (
     BatchPolicy,
+    Robots,
     TaskParameters,
     Trials,
     run_trials,
@@ -142,11 +144,20 @@ class Engine(Protocol):
 class BatchEngine:
     """Engine that runs all trials at once, on threads."""
 
-    def __init__(self, scene: Scene, task: TaskParameters, threads: int = 0):
-        """Allocate the robots; `threads` 0 is one per core."""
-        self._task = task
+    def __init__(
+        self, scene: Scene, task: TaskParameters, threads: int = 0, late: int = 0
+    ):
+        """Allocate the robots.
+
+        Args:
+            scene: robot and arena.
+            task: what a trial is.
+            threads: that step the robots; 0 is one per core.
+            late: control steps until a command has reached the wheels of ideal robots.
+        """
+        self._task, self._late = task, late
         self._robots = robots_in(scene, CAPACITY, threads)
-        self._compiled = compiled_trials(scene, task, threads)
+        self._compiled = compiled_trials(scene, task, threads, late)
 
     def run(self, work: Work) -> Trials:
         """See `Engine.run`."""
@@ -161,7 +172,7 @@ class BatchEngine:
             work = replace(work, race=None)
         parts = [
             run_trials(
-                disturbed(self._robots, part.disturbances, self._task.control_step),
+                self._driven(part.disturbances),
                 part.controller,
                 part.starts,
                 self._task,
@@ -170,6 +181,13 @@ class BatchEngine:
             for part in work.chunks(self._robots.capacity)
         ]
         return Trials.joined(parts)
+
+    def _driven(self, disturbances: Disturbances | None) -> Robots:
+        """The robots of trials with these disturbances."""
+        if disturbances is None:
+            self._robots.disembody()
+            return with_late_commands(self._robots, self._late)
+        return disturbed(self._robots, disturbances, self._task.control_step)
 
 
 class DmControlEngine:

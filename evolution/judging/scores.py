@@ -81,6 +81,11 @@ class HeldOut(_Record, frozen=True):
         return follows if shares else math.nan
 
     @property
+    def keeping(self) -> float:
+        """Share of the trials that followed walls without hugging; nan if unknown."""
+        return self.behaviour.get("wall follower", 0.0) if self.behaviour else math.nan
+
+    @property
     def clearance(self) -> float:
         """Mean clearance near walls [m]; nan if unknown, or never near one."""
         return self._metric("clearance_mean")

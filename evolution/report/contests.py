@@ -1,16 +1,21 @@
 """Experiments held against each other, pair by pair.
 
-P values are Holm-adjusted. The family is all pairs of experiments within one question,
-a measure or a criterion on a robot: each such table is a question of its own.
+Of one question, a measure or a criterion on a robot, there are two families: all pairs
+of the study's first three experiments, and each other experiment with the first. P
+values are Holm-adjusted in their family, so that a comparison has one adjusted p and
+baselines do not cost the main question its power.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from evolution.statistics.significance import FEWEST_FOR_STARS, LEVELS, holm
+
+COMPARED_PAIRWISE = 3
+"""Number of a study's first experiments that are compared pair by pair: the paper's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,24 +51,34 @@ class Contest:
         return self.enough and self.p_holm < LEVELS[0]
 
 
+def families(names: Sequence[str]) -> list[list[tuple[str, str]]]:
+    """Pairs of experiments that are compared, by family, in the experiments' order."""
+    first, others = names[:COMPARED_PAIRWISE], names[COMPARED_PAIRWISE:]
+    pairs = list(combinations(first, 2)), [(names[0], other) for other in others]
+    return [family for family in pairs if family]
+
+
 def contests(
     samples: Mapping[str, np.ndarray],
     alike: Callable[[str, str], bool],
     p_value: Callable[[np.ndarray, np.ndarray], float],
 ) -> list[Contest]:
-    """A contest per pair of experiments that can be compared, in their order.
+    """A contest per pair of experiments that are compared, in their order.
 
     Args:
         samples: of each experiment, `(runs,)`, none of them empty.
         alike: whether two experiments can be compared.
         p_value: of the test of two samples.
     """
-    pairs = [pair for pair in combinations(samples, 2) if alike(*pair)]
-    if not pairs:
-        return []
-    p_values = [p_value(samples[a], samples[b]) for a, b in pairs]
-    adjusted = holm(np.array(p_values)).tolist()
-    return [
-        Contest(a, b, samples[a], samples[b], p, p_holm, len(pairs))
-        for (a, b), p, p_holm in zip(pairs, p_values, adjusted, strict=True)
-    ]
+    found = []
+    for family in families(list(samples)):
+        pairs = [pair for pair in family if alike(*pair)]
+        if not pairs:
+            continue
+        p_values = [p_value(samples[a], samples[b]) for a, b in pairs]
+        adjusted = holm(np.array(p_values)).tolist()
+        found += [
+            Contest(a, b, samples[a], samples[b], p, p_holm, len(pairs))
+            for (a, b), p, p_holm in zip(pairs, p_values, adjusted, strict=True)
+        ]
+    return found

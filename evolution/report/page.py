@@ -11,6 +11,7 @@ from evolution.report.sections.held_out_fitness import held_out_fitness_section
 from evolution.report.sections.how_to_get_every_number_again import (
     how_to_get_every_number_again_section,
 )
+from evolution.report.sections.margins import margins_section
 from evolution.report.sections.success import success_section
 from evolution.report.sections.what_stored_fitness_promised import (
     what_stored_fitness_promised_section,
@@ -26,6 +27,7 @@ SECTIONS: tuple[tuple[Callable[[StudyData], list[Block]], tuple[str, ...]], ...]
     (from_rung_to_rung_section, ("rungs",)),
     (what_stored_fitness_promised_section, ("stored-and-held-out",)),
     (behaviour_section, ("behaviour", "trajectories")),
+    (margins_section, ("margins",)),
     (cost_of_targets_section, ("targets",)),
 )
 """The sections in order, and the figures that belong there."""

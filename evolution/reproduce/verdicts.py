@@ -6,6 +6,7 @@ run needs a Wilson interval on one side of one half. The best of the paper's few
 needs a rank among ours that is not too extreme.
 """
 
+from collections.abc import Sequence
 from math import comb, floor
 
 import numpy as np
@@ -18,7 +19,6 @@ from evolution.statistics.significance import FEWEST_FOR_STARS, LEVELS
 CONSISTENT, INCONSISTENT = "consistent", "inconsistent"
 NOT_CONTRADICTED = "consistent, in that nothing contradicts it"
 UNDECIDED = "can't be tested: undecided by these runs"
-HANGS_ON_READING = "can't be tested: hangs on the reading"
 TOO_FEW = f"can't be tested: fewer than {FEWEST_FOR_STARS} runs"
 NOT_MEASURED = "can't be tested: not measured"
 OTHER_STUDY = "can't be tested: another study"
@@ -82,6 +82,24 @@ def chance_of_best(sample: np.ndarray, best: float, replicates: int) -> float:
 
     at_most = 1 - at_least(above + 1) if above < n else 1.0
     return min(1.0, 2 * min(at_least(above), at_most))
+
+
+def chance_of_order(samples: Sequence[np.ndarray], replicates: int) -> float:
+    """Probability that the best of some runs of each sample have the samples' order.
+
+    Runs are drawn with replacement from samples `(n,)`; equal bests have no order.
+
+    Args:
+        samples: of three experiments, the one that shall have the highest best first.
+        replicates: runs drawn of each.
+    """
+    first, second, third = (np.sort(sample) for sample in samples)
+    ranks = np.arange(second.size + 1) / second.size
+    # the distribution of the best of the second's draws over its values
+    best = np.diff(ranks**replicates)
+    above = np.searchsorted(first, second, side="right") / first.size
+    below = np.searchsorted(third, second, side="left") / third.size
+    return float((best * (1 - above**replicates) * below**replicates).sum())
 
 
 def fewest_to_contradict(replicates: int) -> int:

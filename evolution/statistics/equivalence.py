@@ -6,7 +6,8 @@ large as the margin is excluded.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -33,6 +34,10 @@ class Equivalence:
     high: float
     margin: float
     p: float
+
+    def turned(self) -> Self:
+        """The same test with the second sample first."""
+        return replace(self, shift=-self.shift, low=-self.high, high=-self.low)
 
 
 def equivalence(a: np.ndarray, b: np.ndarray, margin: float) -> Equivalence:

@@ -67,6 +67,7 @@ class Task(NamedTuple):
         speed_max: of a wheel that is told its speed [rad/s].
         n_substeps: substeps of a control step.
         substep: duration of one [s].
+        late: control steps until a command has reached the wheels of an ideal robot.
     """
 
     steps: int
@@ -79,6 +80,7 @@ class Task(NamedTuple):
     speed_max: float
     n_substeps: int
     substep: float
+    late: int
 
 
 class Noise(NamedTuple):
@@ -200,7 +202,7 @@ def trial(
     truth, before = np.empty(N_PROXIMITY), np.empty(N_PROXIMITY)
     distance, observation = np.empty(N_PROXIMITY), np.empty(N_PROXIMITY)
     neurons = np.empty(hidden.shape[2])
-    delay = noise.latency[which] if noise.there else 0
+    delay = noise.latency[which] if noise.there else task.late
     sent = np.zeros((delay + 1, 2))
     body, rays = plan.body, plan.rays
     limit = body.speed_max * (SPARE_SPEED if noise.there else 1.0)
@@ -252,6 +254,11 @@ def trial(
             mean = (left + right) / 2.0
             left = mean + (left - mean) * turn_gain
             right = mean + (right - mean) * turn_gain
+        elif delay > 0:
+            place = k % (delay + 1)
+            sent[place, 0], sent[place, 1] = left, right
+            place = (k + 1) % (delay + 1)
+            left, right = sent[place, 0], sent[place, 1]
         left, right = min(max(left, -limit), limit), min(max(right, -limit), limit)
         crashed = move(
             body,
@@ -360,9 +367,18 @@ def trials(
 class FusedTrials:
     """Compiled trials in one scene; see `CompiledTrials`."""
 
-    def __init__(self, scene: Scene, task: TaskParameters, threads: int = 0):
-        """Store what a trial is; `threads` 0 is one per core."""
-        self._scene, self._task = scene, task
+    def __init__(
+        self, scene: Scene, task: TaskParameters, threads: int = 0, late: int = 0
+    ):
+        """Store what a trial is.
+
+        Args:
+            scene: robot and arena.
+            task: length, fitness, sensors and speeds of a trial.
+            threads: that run trials; 0 is one per core.
+            late: control steps until a command has reached the wheels of ideal robots.
+        """
+        self._scene, self._task, self._late = scene, task, late
         self._threads = threads or os.cpu_count() or 1
         self._plans: dict[float, Plan] = {}
 
@@ -434,6 +450,7 @@ class FusedTrials:
             speeds.turn * TRACK / (2 * WHEEL_RADIUS),
             WHEEL_SPEED_MAX,
             *substeps(self._task.control_step),
+            self._late,
         )
 
 

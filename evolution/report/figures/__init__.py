@@ -15,6 +15,7 @@ from evolution.report.figures.curves import (
     growths_figure,
     targets_figure,
 )
+from evolution.report.figures.margins import margins_of_study_figure
 from evolution.report.figures.trajectories import trajectories_figure
 from evolution.study.data import StudyData
 
@@ -27,6 +28,7 @@ STUDY_FIGURES: Mapping[str, Callable[[StudyData], Captioned | None]] = {
     "stored-and-held-out": stored_and_held_out_figure,
     "rungs": rungs_figure,
     "behaviour": behaviour_figure,
+    "margins": margins_of_study_figure,
     "trajectories": trajectories_figure,
 }
 """Figures of the whole study by file name; None where the study has nothing for it."""

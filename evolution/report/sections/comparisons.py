@@ -8,8 +8,8 @@ from typing import Any, Self
 import numpy as np
 
 from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
-from evolution.pages.words import between, label, numbered, probability, robot_name
-from evolution.report.contests import Contest, contests
+from evolution.pages.words import between, label, probability, robot_name
+from evolution.report.contests import COMPARED_PAIRWISE, Contest, contests
 from evolution.report.measures import (
     generator,
     held_out_measure,
@@ -18,8 +18,14 @@ from evolution.report.measures import (
     shown_robots,
 )
 from evolution.statistics.effect_sizes import a12_interval, median_difference
+from evolution.statistics.equivalence import Equivalence, equivalence
 from evolution.statistics.estimates import FEWEST_FOR_INTERVAL, Interval
-from evolution.statistics.significance import FEWEST_FOR_STARS, mann_whitney, stars
+from evolution.statistics.significance import (
+    FEWEST_FOR_STARS,
+    LEVELS,
+    mann_whitney,
+    stars,
+)
 from evolution.study.data import StudyData
 
 
@@ -31,10 +37,19 @@ class Comparison(Contest):
         a12: probability that a run of the first exceeds one of the second; without
             bounds below 5 runs.
         shift: median of the first minus that of the second.
+        equivalence: test that the two differ by less than the margin.
+        p_equivalence: of this test, adjusted for the family.
     """
 
     a12: Interval
     shift: Interval
+    equivalence: Equivalence
+    p_equivalence: float
+
+    @property
+    def equivalent(self) -> bool:
+        """Whether the runs say that the two differ by less than the margin."""
+        return self.enough and self.p_equivalence < LEVELS[0]
 
     def turned(self) -> Self:
         """This comparison, the second experiment first."""
@@ -47,25 +62,41 @@ class Comparison(Contest):
             of_b=self.of_a,
             a12=Interval(1 - a12.value, 1 - a12.high, 1 - a12.low),
             shift=Interval(-shift.value, -shift.high, -shift.low),
+            equivalence=self.equivalence.turned(),
         )
 
 
+MARGIN = 1 / 30
+"""Margin of equivalence as a share of the most that a trial can earn: 10 of 300."""
+
+
 def comparisons_of(
-    samples: Mapping[str, np.ndarray], alike: Callable[[str, str], bool]
+    samples: Mapping[str, np.ndarray],
+    alike: Callable[[str, str], bool],
+    margin: float,
 ) -> list[Comparison]:
-    """A comparison per pair of experiments within one measure.
+    """A comparison per pair of experiments that are compared within one measure.
 
     Args:
         samples: of each experiment, `(runs,)`, none of them empty.
         alike: whether two experiments can be compared.
+        margin: differences smaller than this count as none.
     """
+
+    def p_equivalence(a: np.ndarray, b: np.ndarray) -> float:
+        return equivalence(a, b, margin).p
+
+    differing = contests(samples, alike, lambda a, b: mann_whitney(a, b).p)
+    equal = contests(samples, alike, p_equivalence)
     return [
         Comparison(
             **vars(each),
             a12=_effect(each.of_a, each.of_b),
             shift=median_difference(each.of_a, each.of_b, generator()),
+            equivalence=equivalence(each.of_a, each.of_b, margin),
+            p_equivalence=like.p_holm,
         )
-        for each in contests(samples, alike, lambda a, b: mann_whitney(a, b).p)
+        for each, like in zip(differing, equal, strict=True)
     ]
 
 
@@ -80,7 +111,7 @@ def _effect(a: np.ndarray, b: np.ndarray) -> Interval:
 def comparisons(data: StudyData) -> dict[str, list[Comparison]]:
     """Every comparison of a study, by measure."""
     return {
-        measure: comparisons_of(samples, data.alike)
+        measure: comparisons_of(samples, data.alike, MARGIN * data.steps)
         for measure, samples in measures(data).items()
     }
 
@@ -103,6 +134,12 @@ PAIR_COLUMNS: Mapping[str, Callable[[Comparison], Any]] = {
     "median_difference": lambda pair: pair.shift.value,
     "median_difference_low": lambda pair: pair.shift.low,
     "median_difference_high": lambda pair: pair.shift.high,
+    "shift": lambda pair: pair.equivalence.shift,
+    "shift_low": lambda pair: pair.equivalence.low,
+    "shift_high": lambda pair: pair.equivalence.high,
+    "margin": lambda pair: pair.equivalence.margin,
+    "p_equivalence": lambda pair: pair.equivalence.p,
+    "p_equivalence_holm": lambda pair: pair.p_equivalence,
     "stars": lambda pair: stars(pair.p_holm, min(pair.of_a.size, pair.of_b.size)),
 }
 """Columns of pairwise.csv after the measure."""
@@ -128,8 +165,12 @@ def comparisons_section(data: StudyData) -> list[Block]:
         return [*blocks, Paragraph("One experiment with runs: nothing to compare.")]
     blocks.append(
         Paragraph(
-            "Two-sided Mann-Whitney tests over runs; Holm's adjustment within each "
-            f"table ({numbered(own[0].family, 'pair')}). A12 is the probability that "
+            "Two-sided Mann-Whitney tests over runs. The first "
+            f"{COMPARED_PAIRWISE} experiments are compared pair by pair, each other "
+            "one with the first. Holm's adjustment is within each of these two "
+            "families of a table, for difference and equivalence alike. Equivalent: "
+            "two one-sided Mann-Whitney tests exclude a shift of "
+            f"{own[0].equivalence.margin:g} or more. A12 is the probability that "
             "a run of the first exceeds one of the second (0.5: no effect), with a "
             "95 % interval; "
             "the difference of medians has a bootstrap 95 % interval. Below "
@@ -153,7 +194,7 @@ def _pair_table(data: StudyData, pairs: Sequence[Comparison]) -> Table:
     return Table(
         (
             *("first, second", "runs", f"medians {unit}", f"difference {unit}"),
-            *("A12", "p", "Holm p", "stars"),
+            *("A12", "p", "Holm p", "stars", "equivalent, Holm p"),
         ),
         [
             (
@@ -165,6 +206,7 @@ def _pair_table(data: StudyData, pairs: Sequence[Comparison]) -> Table:
                 probability(pair.p).removeprefix("= "),
                 probability(pair.p_holm).removeprefix("= "),
                 PAIR_COLUMNS["stars"](pair),
+                probability(pair.p_equivalence).removeprefix("= "),
             )
             for pair in pairs
         ],
@@ -183,7 +225,9 @@ def numbers(pair: Comparison) -> str:
         f"medians {np.median(pair.of_a):.1f} and {np.median(pair.of_b):.1f}, "
         f"difference {pair.shift.value:z.1f} {between(pair.shift, '.1f')}; "
         f"A12 {pair.a12.value:.2f} {between(pair.a12)}; "
-        f"p {probability(pair.p)}, Holm {probability(pair.p_holm)}"
+        f"p {probability(pair.p)}, Holm {probability(pair.p_holm)}; equivalent "
+        f"within {pair.equivalence.margin:g}: Holm p "
+        f"{probability(pair.p_equivalence)}"
     )
 
 
@@ -202,6 +246,13 @@ def compared(pair: Comparison, a: str, b: str) -> str:
         return (
             f"{a} and {b}: {found}. Fewer than {FEWEST_FOR_STARS} runs: "
             "no verdict on which is better."
+        )
+    margin = f"{pair.equivalence.margin:g}"
+    if pair.decided and pair.equivalent:
+        return f"{a} beats {b}, but by less than {margin}: {found}."
+    if pair.equivalent:
+        return (
+            f"{a} and {b} are equivalent, they differ by less than {margin}: {found}."
         )
     if not pair.decided:
         return (
