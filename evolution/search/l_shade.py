@@ -148,6 +148,7 @@ class LShadeParameters:
     The paper's initial population is 18 times the genes, for 10,000 evaluations a gene.
     A run of 30,000 evaluations and 40 genes has 750 a gene: with 720 individuals it
     would have 217 generations, with 100, as SHADE before it, it has about 1,000.
+    The other defaults are the paper's.
 
     Attributes:
         population: first number of individuals, at least 4.
