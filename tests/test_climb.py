@@ -27,9 +27,25 @@ OPTIMIZERS = {
         "crossover": 0.9,
     },
     "cma-es": {"algorithm": "cma_es", "population": 8},
-    "es": {"algorithm": "evolution_strategy", "lineages": 8},
+    "lra-cma-es": {
+        "algorithm": "cma_es",
+        "population": 8,
+        "restarts": False,
+        "learning_rate_adaptation": True,
+    },
+    "es": {
+        "algorithm": "evolution_strategy",
+        "lineages": 8,
+        "reevaluate_parents": False,
+    },
     "random": {"algorithm": "random_search", "population": 8},
+    # so large a budget that it does not shrink
+    "l-shade": {"algorithm": "l_shade", "population": 8, "budget": 100_000},
+    "es reevaluated": {"algorithm": "evolution_strategy", "lineages": 8},
+    "l-shade shrinking": {"algorithm": "l_shade", "population": 12},
 }
+OF_EIGHT = [name for name in OPTIMIZERS if " " not in name]
+"""Those whose generations are eight evaluations each."""
 
 
 def config(name: str = "de", **more) -> ExperimentConfig:
@@ -66,7 +82,7 @@ class Watched:
         return self._engine.run(work)
 
 
-@pytest.mark.parametrize("name", OPTIMIZERS)
+@pytest.mark.parametrize("name", OF_EIGHT)
 def test_the_population_is_evaluated_anew_and_paid_for(name):
     seen: list[tuple[str, int]] = []
     c = config(name)
@@ -122,6 +138,23 @@ def test_resumed_anywhere_it_ends_the_same(name):
         )
 
 
+def test_a_population_that_shrinks_counts_what_is_judged_anew():
+    evolution = evolved(config("l-shade shrinking"))
+    assert evolution.climbed
+    assert evolution.optimizer.arrays()["counts"][2] == evolution.evaluations
+    # of 12, with 4 at the end of the run's evaluations
+    left = 4 + 8 * (1 - evolution.evaluations / 80)
+    assert len(evolution.optimizer.population) == round(left)
+
+
+def test_parents_are_evaluated_anew_and_then_again_and_again():
+    records = evolved(config("es reevaluated")).records
+    spent = [record.evaluations for record in records]
+    # 8, then parents with offspring; all parents anew once
+    assert spent == [8, 24, 40, 64, 80]
+    assert [record.climbed for record in records] == [False] * 3 + [True] * 2
+
+
 def test_engine_threads_and_racing_change_nothing():
     c = config(evaluations=120, steps=30)
     expected = evolved(c).history()
@@ -174,7 +207,7 @@ def test_finalists_are_compared_on_wheels(monkeypatch, finalists):
     assert np.isfinite(champion.validation_fitness)
 
 
-@pytest.mark.parametrize("name", OPTIMIZERS)
+@pytest.mark.parametrize("name", OF_EIGHT)
 @pytest.mark.parametrize("evaluations", [24, 80, 87])
 def test_a_run_too_short_to_climb_spends_all_on_the_kinematic_robot(name, evaluations):
     """Population and generation do not fit into the last tenth."""

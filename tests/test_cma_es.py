@@ -243,6 +243,55 @@ def test_without_restarts_it_goes_on():
     assert np.isfinite(optimizer.population).all()
 
 
+# --- Learning rates that adapt -------------------------------------------------------
+
+
+def test_the_flag_reaches_the_package():
+    for adapts in (False, True):
+        optimizer = make(seed=7, restarts=False, learning_rate_adaptation=adapts)
+        rng = np.random.default_rng(7)
+        cma = SymmetricCma(
+            mean=rng.uniform(-5, 5, size=3),
+            sigma=2.0,
+            bounds=np.array([[-5, 5]] * 3),
+            seed=int(rng.integers(2**32)),
+            population_size=6,
+            lr_adapt=adapts,
+        )
+        for _ in range(30):
+            genomes = [cma.ask() for _ in range(6)]
+            np.testing.assert_array_equal(optimizer.ask(), genomes)
+            cma.tell([(genome, float(np.sum(genome**2))) for genome in genomes])
+            optimizer.tell(sphere(np.array(genomes)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_learning_slowly_gets_nearer_under_noise(seed):
+    space = SearchSpace(genes=10, lower=-5, upper=5, init_lower=-5, init_upper=5)
+    distances = []
+    for adapts in (False, True):
+        rng = noise(seed)
+        optimizer = make(
+            seed, space, 10, restarts=False, learning_rate_adaptation=adapts
+        )
+
+        def noisy(genomes, rng=rng):
+            return sphere(genomes) + 20 * rng(genomes)
+
+        evolve(optimizer, 1000, noisy)
+        distances.append(np.linalg.norm(optimizer._cma.mean))
+    assert distances[1] < distances[0] / 2
+
+
+def test_replay_is_exact_with_learning_rates_that_adapt():
+    def adapting(seed=0):
+        return make(seed, restarts=False, learning_rate_adaptation=True)
+
+    resumed = evolve(adapting(seed=9), 70, noise(3))
+    resumed.restore(evolve(adapting(), 150, noise(2)).state())
+    assert_same(resumed, evolve(adapting(), 150, noise(2)))
+
+
 # --- Replay --------------------------------------------------------------------------
 
 

@@ -54,12 +54,36 @@ BASELINES = {
         "lineages": 10,
         "sigma": 1.0,
         "bounds_rule": "reflect",
+        "reevaluate_parents": True,
+    },
+    "one-plus-one-es-as-first-shipped": {
+        "algorithm": "evolution_strategy",
+        "lineages": 10,
+        "sigma": 1.0,
+        "bounds_rule": "reflect",
+        "reevaluate_parents": False,
     },
     "cma-es": {
         "algorithm": "cma_es",
         "population": 15,
         "sigma": 2.0,
         "restarts": True,
+        "learning_rate_adaptation": False,
+    },
+    "lra-cma-es": {
+        "algorithm": "cma_es",
+        "population": 15,
+        "sigma": 2.0,
+        "restarts": False,
+        "learning_rate_adaptation": True,
+    },
+    "l-shade": {
+        "algorithm": "l_shade",
+        "population": 100,
+        "archive_rate": 2.6,
+        "p_best": 0.11,
+        "memory": 6,
+        "budget": 0,
     },
 }
 SHIPPED = PAPERS | BASELINES
@@ -133,7 +157,7 @@ def refusal(path: Path) -> str:
 
 EVERY_ALGORITHM = (
     "expected a mapping with 'algorithm', one of differential_evolution, "
-    "genetic_algorithm, random_search, evolution_strategy, cma_es"
+    "genetic_algorithm, random_search, evolution_strategy, cma_es, l_shade"
 )
 GA = {"algorithm": "genetic_algorithm"}
 DE = {
@@ -329,6 +353,8 @@ def test_a_wrong_value_is_refused_by_name_and_shown(key, value, config_file):
         ({**GA, "population": 10**9}, ("population: ", "100,000, got 1000000000")),
         ({**GA, "population": 10**25}, ("population: ", "100,000, got 1000000000")),
         ({**GA, "tournament": 10**9}, ("tournament: ", "10,000, got 1000000000")),
+        ({"algorithm": "l_shade", "population": 3}, ("from 4 to", "got 3")),
+        ({"algorithm": "l_shade", "p_best": 0}, ("p_best: ", "a number above 0")),
         ({"algorithm": "cma_es", "population": 3}, ("from 4 to", "got 3")),
         ({"algorithm": "cma_es", "restarts": "x"}, ("optimizer.restarts: ", "'x'")),
         ({"algorithm": "cma"}, (EVERY_ALGORITHM, "cma")),

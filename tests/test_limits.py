@@ -17,7 +17,11 @@ from epuck_mj.step.control import TaskParameters
 from epuck_mj.trials.recorder import record_tracks, record_trajectories
 from evolution.run.generation_loop import Evolution
 from evolution.settings.config import ExperimentConfig
-from evolution.settings.config_files import find_config, load_config
+from evolution.settings.config_files import (
+    find_config,
+    load_config,
+    shipped_experiments,
+)
 from evolution.settings.memory import check_needs, needs
 
 
@@ -126,7 +130,7 @@ def test_products_count(name, changes, keys, small):
 
 
 def test_shipped_experiments_need_little():
-    for name in ("ga", "de-best", "de-rand", "cma-es", "one-plus-one-es"):
+    for name in shipped_experiments():
         config = load_config(find_config(name))
         for factors, size in needs(config):
             assert np.prod(list(factors.values())) * size < 2e8, factors

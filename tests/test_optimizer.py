@@ -27,9 +27,11 @@ from evolution.search.table import (
 from tests.shipped import BASELINES, OPTIMIZERS, PAPERS
 
 BEST, RAND, GA = (OPTIMIZERS[name] for name in PAPERS)
-RANDOM, ES, CMA = (OPTIMIZERS[name] for name in BASELINES)
+RANDOM, ES, CMA, LRA, LSHADE = (OPTIMIZERS[name] for name in BASELINES)
 VARIANTS = {
     **OPTIMIZERS,
+    # a run fills in its evaluations
+    "l-shade": replace(LSHADE, budget=30_000),
     "de-best reevaluated": replace(BEST, reevaluate_parents=True),
     "de-best reinit": replace(BEST, bounds_rule="reinit", crossover=0.5),
     "de-rand clip": replace(RAND, bounds_rule="clip"),
@@ -38,7 +40,16 @@ VARIANTS = {
     "ga 32 bits": replace(GA, bits=32),
     "random-search small": replace(RANDOM, population=7),
     "one-plus-one-es reinit": replace(ES, bounds_rule="reinit", sigma=2.0),
+    "one-plus-one-es as first shipped": replace(ES, reevaluate_parents=False),
     "cma-es without restarts": replace(CMA, restarts=False, population=20),
+    "lra-cma-es with restarts": replace(LRA, restarts=True, population=20),
+    "l-shade shrinking": replace(LSHADE, population=30, budget=500),
+    "l-shade without archive": replace(
+        LSHADE, population=12, budget=400, archive_rate=0
+    ),
+    "l-shade one memory": replace(
+        LSHADE, population=31, budget=900, archive_rate=0.5, memory=1, p_best=1.0
+    ),
 }
 every_variant = pytest.mark.parametrize("variant", VARIANTS)
 
@@ -66,6 +77,7 @@ def test_algorithms_are_the_kinds_of_parameters_by_their_tags():
         "random_search",
         "evolution_strategy",
         "cma_es",
+        "l_shade",
     ]
     for parameters in OPTIMIZERS.values():
         assert ALGORITHMS[parameters.algorithm] is type(parameters)
@@ -125,7 +137,14 @@ def test_genetic_algorithm_solves_the_sphere_to_its_grid(name):
     assert np.abs(best).max() <= 1.5 * 10 / 255 + 1e-12
 
 
-@pytest.mark.parametrize("name", ["one-plus-one-es", "one-plus-one-es reinit"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "one-plus-one-es",
+        "one-plus-one-es reinit",
+        "one-plus-one-es as first shipped",
+    ],
+)
 def test_evolution_strategies_solve_the_sphere(name):
     optimizer = evolved(make(name), 400)
     # Each of them: they are independent.
@@ -135,6 +154,16 @@ def test_evolution_strategies_solve_the_sphere(name):
 @pytest.mark.parametrize("name", ["cma-es", "cma-es without restarts"])
 def test_cma_es_solves_the_sphere(name):
     assert evolved(make(name), 60).fitness.max() > -1e-6
+
+
+def test_learning_rates_that_adapt_solve_the_sphere_later():
+    # its mean learns a sixth as fast
+    assert evolved(make("lra-cma-es"), 120).fitness.max() > -1e-6
+
+
+@pytest.mark.parametrize("name", [name for name in VARIANTS if "l-shade" in name])
+def test_l_shade_solves_the_sphere(name):
+    assert evolved(make(name), 100).fitness.max() > -1e-6
 
 
 @pytest.mark.parametrize("name", ["random-search", "random-search small"])
@@ -192,7 +221,10 @@ def test_every_numpy_generator_can_be_saved(kind):
 # --- Racing --------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("variant", ["de-best", "random-search", "one-plus-one-es"])
+@pytest.mark.parametrize(
+    "variant",
+    ["de-best", "random-search", "one-plus-one-es as first shipped", "l-shade"],
+)
 def test_there_is_something_to_win_by_racing(variant):
     optimizer = evolved(make(variant), 10)
     genomes = optimizer.ask()

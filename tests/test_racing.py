@@ -30,7 +30,8 @@ SPACE = FreeSpace(SCENE, 0.01)
 NETWORK = Network()
 TASK = TaskParameters(steps=60)
 
-RACES = ("de-best", "de-rand", "random-search", "one-plus-one-es")
+ELITIST = "one-plus-one-es-as-first-shipped"
+RACES = ("de-best", "de-rand", "random-search", "l-shade", ELITIST)
 """Optimisers that forget who does not beat somebody."""
 
 
@@ -245,6 +246,9 @@ def small(name: str, **update) -> ExperimentConfig:
     # of random search few can be broken off, and late
     if name == "random-search":
         sizes |= {"evaluations": 120, "steps": 60}
+    # its parents count as well
+    if name == "one-plus-one-es":
+        sizes |= {"evaluations": 10 * (2 * GENERATIONS - 1)}
     sizes |= {"validation_starts": 20, "optimizer": optimizer}
     return config.model_copy(update=sizes | update)
 
@@ -278,7 +282,7 @@ def steps_of(experiment: Evolution) -> list[int]:
 
 
 CASES = [
-    *zip(OPTIMIZERS, repeat("product"), strict=False),
+    *zip((*OPTIMIZERS, ELITIST), repeat("product"), strict=False),
     *zip(RACES[:2], repeat("literal"), strict=False),
 ]
 

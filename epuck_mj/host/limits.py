@@ -101,6 +101,11 @@ LIMITS: Mapping[str, Limit] = MappingProxyType(
         "elites": Limit(0, 100_000),
         "scale": Limit(0, 2, whole=False),
         "sigma": _above_0(2_000_000),
+        "archive_rate": Limit(0, 10, whole=False),
+        "p_best": _above_0(1),
+        "memory": Limit(1, 1000),
+        # 0 is the run's
+        "budget": Limit(0, 100_000_000),
         # controller files
         "n_genes": COUNT,
         "n_state": Limit(0, 100_000),

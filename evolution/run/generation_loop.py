@@ -5,7 +5,7 @@ result. Randomness is keyed by what it is for: `random_generator(seed, purpose, 
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import astuple
+from dataclasses import astuple, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.disturbances import Disturbances
 from evolution.judging.evaluation import BatchEngine, DmControlEngine, Engine, evaluate
 from evolution.run.history import Record, history_text
+from evolution.search.l_shade import LShadeParameters
 from evolution.search.table import Optimizer, make_optimizer
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.memory import check_needs
@@ -254,8 +255,11 @@ class Evolution:
 def _optimizer(config: ExperimentConfig) -> Optimizer:
     """The optimiser at generation 0."""
     rng = random_generator(config.seed, Purpose.SEARCH)
+    parameters = config.optimizer
+    if isinstance(parameters, LShadeParameters) and not parameters.budget:
+        parameters = replace(parameters, budget=config.evaluations)
     try:
-        return make_optimizer(config.optimizer, config.search_space, rng)
+        return make_optimizer(parameters, config.search_space, rng)
     except ValueError as error:
         raise UserError(str(error)) from None
 

@@ -14,7 +14,9 @@ those of `SymmetricCma`.
 
 Source:
     N. Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772; restarts:
-    A. Auger and N. Hansen, IEEE Congress on Evolutionary Computation (2005) 1769-1776.
+    A. Auger and N. Hansen, IEEE Congress on Evolutionary Computation (2005) 1769-1776;
+    learning rates that adapt: M. Nomura, Y. Akimoto and I. Ono, CMA-ES with Learning
+    Rate Adaptation, arXiv:2304.03473.
 """
 
 from collections.abc import Mapping
@@ -64,6 +66,9 @@ class CmaEsParameters:
             restart. The tutorial's default for 40 genes is 15.
         sigma: first step size of each start, above 0, at most the width of the bounds.
         restarts: start again when there is no more progress; otherwise continue.
+        learning_rate_adaptation: learn more slowly the less of each change is more than
+            noise (LRA-CMA-ES). It takes the place of a larger population, so restarts
+            and their doubling are better off.
         algorithm: the algorithm's name in configurations.
 
     Raises:
@@ -73,6 +78,7 @@ class CmaEsParameters:
     population: int = 15
     sigma: float = 2.0
     restarts: bool = True
+    learning_rate_adaptation: bool = False
     algorithm: Literal["cma_es"] = "cma_es"
     # read by the configuration: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
@@ -84,7 +90,7 @@ class CmaEsParameters:
 
 
 class CmaEs(Optimizer):
-    """The optimiser 'cma-es'.
+    """The optimiser 'cma-es', or 'lra-cma-es' if its learning rates adapt.
 
     Its population are the individuals last told, good or bad; it grows at a restart.
     """
@@ -105,7 +111,8 @@ class CmaEs(Optimizer):
         self._birth = generator_state(rng)
         self._told = [np.empty(0)]
         self._cma = self._started(parameters.population)
-        super().__init__("cma-es", self.propose(), rng)
+        name = "lra-cma-es" if parameters.learning_rate_adaptation else "cma-es"
+        super().__init__(name, self.propose(), rng)
 
     def next_size(self) -> int:
         """See `Optimizer.next_size`."""
@@ -182,6 +189,7 @@ class CmaEs(Optimizer):
             bounds=np.tile([space.lower, space.upper], (space.genes, 1)),
             seed=int(self.rng.integers(2**32)),
             population_size=population,
+            lr_adapt=self._parameters.learning_rate_adaptation,
         )
 
     def propose(self) -> np.ndarray:

@@ -6,6 +6,10 @@ standard normal vector, and is replaced iff that is strictly fitter. A tie keeps
 parent and counts as a failure. Randomness is drawn in this order: the initial
 population, then for each generation the normal vectors, the bounds rule.
 
+Where fitness is noisy, parents have to be evaluated again with their offspring, on the
+same trials. Otherwise a parent that was lucky once is never replaced, and every failure
+makes its steps smaller: they end at `SIGMA_MIN`, far from any optimum.
+
 Source:
     I. Rechenberg, Evolutionsstrategie (1973), for the rule; in the form for a single
     offspring of S. Kern et al., Natural Computing 3 (2004) 77-112: sigma times alpha
@@ -58,6 +62,9 @@ class EvolutionStrategyParameters:
         sigma: first step size of each, above 0, at most the width of the bounds.
         bounds_rule: how a gene outside the bounds is moved: midpoint, none, clip,
             reflect or reinit.
+        reevaluate_parents: from the second generation on, evaluate parents and
+            offspring together, and compare and store their new fitness only. A
+            generation then costs 2 evaluations for each lineage.
         algorithm: the algorithm's name in configurations.
 
     Raises:
@@ -67,6 +74,7 @@ class EvolutionStrategyParameters:
     lineages: int = 10
     sigma: float = 1.0
     bounds_rule: str = "reflect"
+    reevaluate_parents: bool = True
     algorithm: Literal["evolution_strategy"] = "evolution_strategy"
     # read by the configuration: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
@@ -81,8 +89,8 @@ class EvolutionStrategyParameters:
 class EvolutionStrategy(Optimizer):
     """The optimiser 'one-plus-one-es'.
 
-    Its population are the parents. Their stored fitness is for ever the one that let
-    them in.
+    Its population are the parents. Without `reevaluate_parents` their stored fitness is
+    for ever the one that let them in.
     """
 
     def __init__(
@@ -104,32 +112,49 @@ class EvolutionStrategy(Optimizer):
         self._space = space
         self._sigma = np.full(parameters.lineages, parameters.sigma, dtype=np.float64)
 
+    def next_size(self) -> int:
+        """See `Optimizer.next_size`."""
+        return len(self.population) * (2 if self._reevaluates() else 1)
+
     def to_beat(self) -> np.ndarray:
         """See `Optimizer.to_beat`: the parents' fitness, which at first is -inf.
 
-        Any other offspring is a failure, and by how much is forgotten.
+        Any other offspring is a failure, and by how much is forgotten. Without a limit
+        where parents are re-evaluated, which changes what is to be beaten.
         """
-        self.pending()
+        asked = self.pending()
+        if self._reevaluates():
+            return np.full(len(asked), -np.inf)
         return self.fitness.copy()
 
+    def _reevaluates(self) -> bool:
+        """Whether this generation asks parents and offspring together."""
+        return self._parameters.reevaluate_parents and self.generation > 0
+
     def propose(self) -> np.ndarray:
-        """One offspring of each parent `(lineages, genes)`."""
+        """One offspring of each parent, after the parents if those are re-evaluated."""
         parents, space, rng = self.population, self._space, self.rng
         steps = rng.standard_normal(parents.shape)
         offspring = parents + self._sigma[:, np.newaxis] * steps
         keep_inside = BOUNDS_RULES[self._parameters.bounds_rule]
-        return keep_inside(offspring, parents, space.lower, space.upper, rng)
+        offspring = keep_inside(offspring, parents, space.lower, space.upper, rng)
+        if self._reevaluates():
+            return np.concatenate([parents, offspring])
+        return offspring
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Let offspring replace their parents if strictly better; adapt sigma."""
         if self.generation == 0:
             self.fitness = read_only(told)
             return
-        success = told > self.fitness
+        n = len(self.population)
+        parent_fitness = told[:n] if self._reevaluates() else self.fitness
+        offspring, offspring_fitness = asked[-n:], told[-n:]
+        success = offspring_fitness > parent_fitness
         self.population = read_only(
-            np.where(success[:, np.newaxis], asked, self.population)
+            np.where(success[:, np.newaxis], offspring, self.population)
         )
-        self.fitness = read_only(np.where(success, told, self.fitness))
+        self.fitness = read_only(np.where(success, offspring_fitness, parent_fitness))
         lower, upper = self._space.lower, self._space.upper
         self._sigma = one_fifth_rule(self._sigma, success, lower, upper)
 

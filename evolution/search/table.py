@@ -2,7 +2,7 @@
 
 Only this module imports all algorithms, which are one module each. They share
 `ask_tell` and `search_space`. The baselines beside the paper's are random search,
-(1+1)-ES and CMA-ES.
+(1+1)-ES, CMA-ES and L-SHADE.
 
     optimizer = make_optimizer(config.optimizer, config.search_space, rng)
     while spent + optimizer.next_size() <= budget:
@@ -34,6 +34,7 @@ from evolution.search.genetic_algorithm import (
     GeneticAlgorithm,
     GeneticAlgorithmParameters,
 )
+from evolution.search.l_shade import LShade, LShadeParameters
 from evolution.search.random_search import RandomSearch, RandomSearchParameters
 from evolution.search.search_space import SearchSpace
 
@@ -53,6 +54,7 @@ OptimizerParameters = (
     | RandomSearchParameters
     | EvolutionStrategyParameters
     | CmaEsParameters
+    | LShadeParameters
 )
 
 Maker = Callable[[Any, SearchSpace, Generator], Optimizer]
@@ -63,6 +65,7 @@ MAKERS: Mapping[type[OptimizerParameters], Maker] = {
     RandomSearchParameters: RandomSearch,
     EvolutionStrategyParameters: EvolutionStrategy,
     CmaEsParameters: CmaEs,
+    LShadeParameters: LShade,
 }
 
 ALGORITHMS: Mapping[str, type[OptimizerParameters]] = {

@@ -7,6 +7,7 @@ from epuck_mj.host.memory import TRACK_BYTES, check_memory
 from evolution.search.cma_es import CmaEsParameters
 from evolution.search.differential_evolution import DifferentialEvolutionParameters
 from evolution.search.genetic_algorithm import GeneticAlgorithmParameters
+from evolution.search.l_shade import MIN_POPULATION, LShadeParameters
 from evolution.settings.config import ExperimentConfig
 
 COPIES = 8 * 8
@@ -51,5 +52,11 @@ def needs(config: ExperimentConfig) -> Iterator[tuple[dict[str, int], int]]:
     if isinstance(optimizer, GeneticAlgorithmParameters):
         yield population | {"bits": optimizer.bits} | weights, COPIES
         yield population | {"tournament": optimizer.tournament}, COPIES
+    if isinstance(optimizer, LShadeParameters):
+        # it shrinks to so many
+        generations = {
+            f"evaluations / {MIN_POPULATION}": config.evaluations // MIN_POPULATION
+        }
+        yield generations | weights, COPIES
     if isinstance(optimizer, CmaEsParameters):
         yield weights | {"itself": config.topology.n_genes}, COPIES
