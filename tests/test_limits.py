@@ -19,6 +19,7 @@ from evolution.run.generation_loop import Evolution
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from evolution.settings.memory import check_needs, needs
+from tests.shipped import OPTIMIZERS
 
 
 @pytest.mark.parametrize("name", LIMITS)
@@ -113,6 +114,11 @@ def experiment(name: str, **changes) -> ExperimentConfig:
             {"evaluations": 10**8, "hidden": 100},
             "evaluations / lineages (10,000,000) x weights of the network (1,000)",
         ),
+        (
+            "openai-es",
+            {"pairs": 100_000, "hidden": 100},
+            "pairs (100,000) x weights of",
+        ),
         ("cma-es", {"hidden": 1000}, "weights of the network (10,000) x itself"),
     ],
 )
@@ -126,7 +132,7 @@ def test_products_count(name, changes, keys, small):
 
 
 def test_shipped_experiments_need_little():
-    for name in ("ga", "de-best", "de-rand", "cma-es", "one-plus-one-es"):
+    for name in OPTIMIZERS:
         config = load_config(find_config(name))
         for factors, size in needs(config):
             assert np.prod(list(factors.values())) * size < 2e8, factors

@@ -21,6 +21,8 @@ LABELS: Mapping[str, str] = {
     "cma-es": "CMA-ES",
     "one-plus-one-es": "(1+1)-ES",
     "random-search": "random search",
+    "openai-es": "OpenAI-ES",
+    "ssshc": "SSSHC",
     "de-best-calibrated": "DE/best/1/bin, calibrated",
     "de-best-randomised": "DE/best/1/bin, randomised",
     "ga-randomised": "GA, randomised",

@@ -39,8 +39,9 @@ class Options:
 
     Attributes:
         experiment: a shipped experiment (de-best, de-rand, ga, random-search,
-            one-plus-one-es, cma-es, de-best-calibrated, de-best-randomised,
-            ga-randomised) or a YAML file; must be the first argument.
+            one-plus-one-es, cma-es, openai-es, ssshc, de-best-calibrated,
+            de-best-randomised, ga-randomised) or a YAML file; must be the first
+            argument.
         config: the experiment's keys; a flag overrides the YAML file.
         optimizer: an optimiser of your own, my.py:Class, instead of the experiment's.
         output: run directory; runs/<experiment>-seed-<seed> if not given.

@@ -2,7 +2,7 @@
 
 Only this module imports all algorithms, which are one module each. They share
 `ask_tell` and `search_space`. The baselines beside the paper's are random search,
-(1+1)-ES and CMA-ES.
+(1+1)-ES, CMA-ES, OpenAI-ES and SSSHC.
 
     optimizer = make_optimizer(config.optimizer, config.search_space, rng)
     while spent + optimizer.next_size() <= budget:
@@ -34,8 +34,10 @@ from evolution.search.genetic_algorithm import (
     GeneticAlgorithm,
     GeneticAlgorithmParameters,
 )
+from evolution.search.openai_es import OpenAiEs, OpenAiEsParameters
 from evolution.search.random_search import RandomSearch, RandomSearchParameters
 from evolution.search.search_space import SearchSpace
+from evolution.search.ssshc import Ssshc, SsshcParameters
 
 __all__ = [
     "ALGORITHMS",
@@ -53,6 +55,8 @@ OptimizerParameters = (
     | RandomSearchParameters
     | EvolutionStrategyParameters
     | CmaEsParameters
+    | OpenAiEsParameters
+    | SsshcParameters
 )
 
 Maker = Callable[[Any, SearchSpace, Generator], Optimizer]
@@ -63,6 +67,8 @@ MAKERS: Mapping[type[OptimizerParameters], Maker] = {
     RandomSearchParameters: RandomSearch,
     EvolutionStrategyParameters: EvolutionStrategy,
     CmaEsParameters: CmaEs,
+    OpenAiEsParameters: OpenAiEs,
+    SsshcParameters: Ssshc,
 }
 
 ALGORITHMS: Mapping[str, type[OptimizerParameters]] = {
