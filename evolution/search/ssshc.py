@@ -27,7 +27,7 @@ Source:
     their parents, and mutates 2 % of the genes. Here every generation has starts of its
     own: therefore a parent's fitness is the mean of all its evaluations, and a
     candidate is compared with that. That noise is a share of the fitness, and how
-    large, is this project's reading. With 2 % of 40 genes, 45 % of all offspring were
+    large, is this project's reading. With 2 % of 40 genes, 45 % of all offspring are
     copies of their parents; 10 % was better in trials.
 """
 
