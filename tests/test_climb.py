@@ -46,6 +46,12 @@ OPTIMIZERS = {
 }
 OF_EIGHT = [name for name in OPTIMIZERS if " " not in name]
 """Those whose generations are eight evaluations each."""
+MORE = {
+    "openai-es": {"algorithm": "openai_es", "pairs": 4},
+    "ssshc": {"algorithm": "ssshc", "population": 6},
+    "de, the best again": OPTIMIZERS["de"] | {"reevaluate_best": 2},
+}
+"""Optimisers whose generations are of other sizes than 8."""
 
 
 def config(name: str = "de", **more) -> ExperimentConfig:
@@ -56,7 +62,7 @@ def config(name: str = "de", **more) -> ExperimentConfig:
         "trials": 2,
         "climb": 0.5,
         "validation_starts": 6,
-        "optimizer": OPTIMIZERS[name],
+        "optimizer": (OPTIMIZERS | MORE)[name],
     }
     return ExperimentConfig.parsed(fields | more, "config")
 
@@ -120,7 +126,39 @@ def test_not_every_run_climbs(more, robots):
     assert {line.split(",")[-1] for line in lines} == robots
 
 
-@pytest.mark.parametrize("name", OPTIMIZERS)
+@pytest.mark.parametrize("name", MORE)
+def test_a_population_of_any_size_is_paid_for(name):
+    evolution = Evolution(config(name), threads=1)
+    spent, climbed = 0, False
+    for record in evolution.run():
+        # evaluated anew at the climb
+        anew = record.climbed and not climbed
+        climbed = record.climbed
+        asked = record.evaluations - spent - anew * len(evolution.optimizer.population)
+        assert (
+            asked
+            == {
+                "openai-es": 9,
+                "ssshc": 12 if record.generation % 2 else 6,
+                "de, the best again": 10 if record.generation else 8,
+            }[name]
+        )
+        spent = record.evaluations
+    assert climbed
+    assert 80 - evolution.optimizer.next_size() < spent <= 80
+
+
+@pytest.mark.parametrize("name", ["ssshc", "de, the best again"])
+def test_means_begin_again_where_fitness_is_judged_anew(name):
+    optimizer = Evolution(config(name)).optimizer
+    for _ in range(6):
+        optimizer.tell(np.arange(len(optimizer.ask()))[::-1])
+    assert optimizer.state()["evaluations"].max() > 1
+    optimizer.judge_anew(np.zeros(len(optimizer.population)))
+    assert optimizer.state()["evaluations"].tolist() == [1] * len(optimizer.population)
+
+
+@pytest.mark.parametrize("name", [*OPTIMIZERS, *MORE])
 def test_resumed_anywhere_it_ends_the_same(name):
     whole = evolved(config(name))
     expected = whole.history()

@@ -27,6 +27,7 @@ PAPERS = {
         "crossover": 1.0,
         "bounds_rule": "midpoint",
         "reevaluate_parents": False,
+        "reevaluate_best": 0,
     },
     "de-rand": {
         "algorithm": "differential_evolution",
@@ -36,6 +37,7 @@ PAPERS = {
         "crossover": 1.0,
         "bounds_rule": "midpoint",
         "reevaluate_parents": False,
+        "reevaluate_best": 0,
     },
     "ga": {
         "algorithm": "genetic_algorithm",
@@ -45,6 +47,8 @@ PAPERS = {
         "crossover": 0.85,
         "mutation": 0.01,
         "elites": 0,
+        "coding": "binary",
+        "crossover_points": 1,
     },
 }
 BASELINES = {
@@ -84,6 +88,20 @@ BASELINES = {
         "p_best": 0.11,
         "memory": 6,
         "budget": 0,
+    },
+    "openai-es": {
+        "algorithm": "openai_es",
+        "pairs": 20,
+        "sigma": 0.5,
+        "learning_rate": 0.2,
+        "weight_decay": 0.0,
+    },
+    "ssshc": {
+        "algorithm": "ssshc",
+        "population": 20,
+        "mutation": 0.1,
+        "stochasticity": 0.1,
+        "refinements": 1,
     },
 }
 SHIPPED = PAPERS | BASELINES
@@ -157,7 +175,8 @@ def refusal(path: Path) -> str:
 
 EVERY_ALGORITHM = (
     "expected a mapping with 'algorithm', one of differential_evolution, "
-    "genetic_algorithm, random_search, evolution_strategy, cma_es, l_shade"
+    "genetic_algorithm, random_search, evolution_strategy, cma_es, l_shade, "
+    "openai_es, ssshc"
 )
 GA = {"algorithm": "genetic_algorithm"}
 DE = {
@@ -357,6 +376,15 @@ def test_a_wrong_value_is_refused_by_name_and_shown(key, value, config_file):
         ({"algorithm": "l_shade", "p_best": 0}, ("p_best: ", "a number above 0")),
         ({"algorithm": "cma_es", "population": 3}, ("from 4 to", "got 3")),
         ({"algorithm": "cma_es", "restarts": "x"}, ("optimizer.restarts: ", "'x'")),
+        ({**GA, "coding": "grey"}, ("unknown coding 'grey'", "binary, gray")),
+        ({**GA, "crossover_points": 3}, ("crossover_points: ", "from 1 to 2, got 3")),
+        ({**DE, "reevaluate_best": 11}, ("expected 0 to population = 10", "got 11")),
+        (
+            {**DE, "reevaluate_best": 1, "reevaluate_parents": True},
+            ("expected 0 together with reevaluate_parents", "got 1"),
+        ),
+        ({"algorithm": "openai_es", "pairs": 0}, ("pairs: ", "from 1 to", "got 0")),
+        ({"algorithm": "ssshc", "stochasticity": 2}, ("from 0 to 1", "got 2")),
         ({"algorithm": "cma"}, (EVERY_ALGORITHM, "cma")),
         ({"algorithm": ["cma_es"]}, (EVERY_ALGORITHM, "['cma_es']")),
         ({"bits": 8}, (EVERY_ALGORITHM,)),

@@ -55,6 +55,15 @@ def sphere(genomes: np.ndarray) -> np.ndarray:
         ({"crossover": 1.1}, "^crossover: expected a number from 0 to 1, got 1.1$"),
         ({"crossover": -0.1}, "^crossover: "),
         (
+            {"reevaluate_best": 9},
+            "^reevaluate_best: expected 0 to population = 8, got 9$",
+        ),
+        ({"reevaluate_best": -1}, "^reevaluate_best: expected a whole number from 0 "),
+        (
+            {"reevaluate_best": 1, "reevaluate_parents": True},
+            "^reevaluate_best: expected 0 together with reevaluate_parents, got 1$",
+        ),
+        (
             {"bounds_rule": "wrap"},
             "^unknown bounds rule 'wrap'; "
             "available: midpoint, none, clip, reflect, reinit$",
@@ -322,6 +331,61 @@ def test_reevaluated_parents_are_asked_first_and_judged_afresh():
     np.testing.assert_array_equal(optimizer.population[0::2], initial[0::2])
     np.testing.assert_array_equal(optimizer.population[1::2], asked[9::2])
     assert optimizer.fitness.tolist() == [0, 2, 2, 4, 4, 6, 6, 8]
+
+
+# --- The best evaluated again --------------------------------------------------------
+
+
+def test_the_best_are_asked_again_and_have_means():
+    optimizer = make(reevaluate_best=2)
+    initial = optimizer.ask()
+    optimizer.tell([5, 90, 1, 2, 60, 3, 4, 0])
+    assert optimizer.next_size() == 10
+    asked = optimizer.ask()
+    np.testing.assert_array_equal(asked[:2], initial[[1, 4]])
+    # only they and their trials may be told anything
+    free = [0, 1, 3, 6]
+    expected = np.array([0, 0, 5, 0, 1, 2, 0, 3, 4, 0.0])
+    expected[free] = -np.inf
+    assert optimizer.to_beat().tolist() == expected.tolist()
+    # means of 50 and 62: a trial of 51 wins, one of 62 does not
+    optimizer.tell([10, 64, 0, 51, 1, 2, 62, 3, 4, 0.5])
+    assert optimizer.fitness.tolist() == [5, 51, 1, 2, 62, 3, 4, 0.5]
+    np.testing.assert_array_equal(optimizer.population[1], asked[3])
+    np.testing.assert_array_equal(optimizer.population[4], initial[4])
+    counts = optimizer.state()["evaluations"]
+    assert counts.tolist() == [1, 1, 1, 1, 2, 1, 1, 1]
+    # the third evaluation of the one, the second of the other
+    optimizer.ask()
+    optimizer.tell([53, 32, *[-1] * 8])
+    assert optimizer.fitness.tolist() == [5, 52, 1, 2, 52, 3, 4, 0.5]
+
+
+def test_without_it_the_state_is_what_it_was():
+    assert "evaluations" not in make().state()
+    assert "evaluations" not in make(reevaluate_parents=True).state()
+    assert "evaluations" in make(reevaluate_best=1).state()
+
+
+def bias_of_the_best(seed: int, **changes) -> float:
+    """Stored minus true fitness of the stored best, after 60 noisy generations."""
+    noise = np.random.default_rng(seed)
+    optimizer = make("best", seed, population=20, scale=0.5, **changes)
+    for _ in range(60):
+        genomes = optimizer.ask()
+        optimizer.tell(sphere(genomes) + noise.normal(0, 3, len(genomes)))
+    best = np.argmax(optimizer.fitness)
+    return optimizer.fitness[best] - sphere(optimizer.population[best])
+
+
+def test_under_noise_the_best_is_believed_less_where_it_is_evaluated_again():
+    seeds = range(20)
+    believed = np.mean([bias_of_the_best(seed) for seed in seeds])
+    again = np.mean([bias_of_the_best(seed, reevaluate_best=3) for seed in seeds])
+    # three standard deviations of the noise; what is left is that of newcomers, who
+    # have been evaluated once
+    assert believed > 9
+    assert again < 0.7 * believed
 
 
 # --- Against scipy, in distribution --------------------------------------------------

@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 from evolution.search.genetic_algorithm import (
     GeneticAlgorithm,
     GeneticAlgorithmParameters,
+    binary_of_gray,
     decode,
     mutate,
     one_point_crossover,
     tournament_winners,
+    two_point_crossover,
 )
 from evolution.search.search_space import SearchSpace
 
@@ -309,3 +311,81 @@ def test_nobody_survives_without_elites():
     optimizer.tell(sphere(initial))
     same = np.all(optimizer.ask()[:, np.newaxis] == initial, axis=-1)
     assert not same.any()
+
+
+# --- Gray code -----------------------------------------------------------------------
+
+
+def test_gray_code_of_3_bits_by_hand():
+    codes = ("000", "001", "011", "010", "110", "111", "101", "100")
+    binary = binary_of_gray(chromosome(*codes), 3)
+    assert decode(binary, 3, 0.0, 7.0).tolist() == list(range(8))
+
+
+@pytest.mark.parametrize("bits", [1, 2, 5, 8])
+def test_gray_code_is_a_bijection_whose_neighbours_differ_by_one_bit(bits):
+    texts = [f"{level:0{bits}b}" for level in range(2**bits)]
+    codes = np.stack([chromosome(text) for text in texts])
+    levels = decode(binary_of_gray(codes, bits), bits, 0.0, 2.0**bits - 1).ravel()
+    assert sorted(levels.tolist()) == list(range(2**bits))
+    by_level = codes[np.argsort(levels)]
+    # and the last differs by one bit from the first
+    assert ((by_level != np.roll(by_level, 1, axis=0)).sum(axis=1) == 1).all()
+
+
+def test_gray_genes_are_decoded_one_by_one():
+    # 7, 2, 4 of 8 levels
+    genes = chromosome("100", "011", "110")
+    binary = binary_of_gray(np.stack([genes, genes]), 3)
+    assert decode(binary, 3, 0.0, 7.0).tolist() == [[7, 2, 4]] * 2
+
+
+def test_only_the_decoding_is_another_in_gray_code():
+    binary, gray = make(bits=5), make(bits=5, coding="gray")
+    assert binary.ask().tolist() != gray.ask().tolist()
+    ours, theirs = make(bits=5).state(), make(bits=5, coding="gray").state()
+    for key, array in ours.items():
+        np.testing.assert_array_equal(array, theirs[key])
+    decoded = decode(binary_of_gray(theirs["chromosomes"], 5), 5, -5.0, 5.0)
+    np.testing.assert_array_equal(gray.population, decoded)
+
+
+# --- Two points ----------------------------------------------------------------------
+
+
+def test_two_points_exchange_exactly_the_middle():
+    length, n_pairs = 9, 200
+    parents = np.tile([[False] * length, [True] * length], (n_pairs, 1))
+    children = two_point_crossover(parents, 0.5, np.random.default_rng(8))
+    same = np.random.default_rng(8)
+    one = same.integers(1, length, size=n_pairs)
+    other = same.integers(1, length - 1, size=n_pairs)
+    crossed = same.random(n_pairs) < 0.5
+    assert set(crossed.tolist()) == {True, False}
+    for pair in range(n_pairs):
+        left = [point for point in range(1, length) if point != one[pair]]
+        begin, end = sorted([int(one[pair]), left[other[pair] - 1]])
+        begin, end = (begin, end) if crossed[pair] else (0, 0)
+        first = chromosome("0" * begin, "1" * (end - begin), "0" * (length - end))
+        assert children[2 * pair].tolist() == first.tolist()
+        assert children[2 * pair + 1].tolist() == (~first).tolist()
+
+
+def test_every_two_points_are_equally_likely():
+    length, n_pairs = 5, 12_000
+    parents = np.tile([[False] * length, [True] * length], (n_pairs, 1))
+    children = two_point_crossover(parents, 1.0, np.random.default_rng(0))
+    middles, counts = np.unique(children[0::2], axis=0, return_counts=True)
+    # two of four points; both ends are never exchanged
+    assert len(middles) == 6
+    assert not middles[:, [0, -1]].any()
+    assert scipy.stats.chisquare(counts).pvalue > 0.001
+
+
+def test_smallest_chromosomes_of_two_points():
+    one_gene = SearchSpace(genes=1, lower=-5, upper=5, init_lower=-5, init_upper=5)
+    with pytest.raises(ValueError, match="at least 3 bits to cross, got 2"):
+        make(space=one_gene, bits=2, crossover_points=2)
+    optimizer = make(space=one_gene, bits=3, crossover_points=2)
+    for _ in range(5):
+        optimizer.tell(sphere(optimizer.ask()))

@@ -117,6 +117,11 @@ def experiment(name: str, **changes) -> ExperimentConfig:
             {"evaluations": 10**8, "hidden": 100},
             "evaluations / lineages (10,000,000) x weights of the network (1,000)",
         ),
+        (
+            "openai-es",
+            {"pairs": 100_000, "hidden": 100},
+            "pairs (100,000) x weights of",
+        ),
         ("cma-es", {"hidden": 1000}, "weights of the network (10,000) x itself"),
     ],
 )

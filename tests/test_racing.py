@@ -31,7 +31,7 @@ NETWORK = Network()
 TASK = TaskParameters(steps=60)
 
 ELITIST = "one-plus-one-es-as-first-shipped"
-RACES = ("de-best", "de-rand", "random-search", "l-shade", ELITIST)
+RACES = ("de-best", "de-rand", "random-search", "l-shade", "ssshc", ELITIST)
 """Optimisers that forget who does not beat somebody."""
 
 
@@ -242,6 +242,8 @@ def small(name: str, **update) -> ExperimentConfig:
     optimizer = config.optimizer
     if "population" in {field.name for field in fields(optimizer)}:
         optimizer = replace(optimizer, **{"population": 10})
+    if name == "openai-es":
+        optimizer = replace(optimizer, **{"pairs": 4})
     sizes = {"evaluations": 10 * GENERATIONS, "steps": 40, "trials": 3}
     # of random search few can be broken off, and late
     if name == "random-search":
@@ -249,6 +251,9 @@ def small(name: str, **update) -> ExperimentConfig:
     # its parents count as well
     if name == "one-plus-one-es":
         sizes |= {"evaluations": 10 * (2 * GENERATIONS - 1)}
+    # every other generation is of parents, too
+    if name == "ssshc":
+        sizes |= {"evaluations": 120}
     sizes |= {"validation_starts": 20, "optimizer": optimizer}
     return config.model_copy(update=sizes | update)
 
@@ -340,6 +345,15 @@ def test_nothing_is_broken_off_where_parents_are_evaluated_again():
     raced, whole = (evolved(config, racing=racing) for racing in (True, False))
     assert_same(raced, whole)
     assert raced.records == whole.records
+
+
+def test_who_is_not_evaluated_again_races():
+    config = small("de-best")
+    optimizer = replace(config.optimizer, **{"reevaluate_best": 3})
+    config = config.model_copy(update={"optimizer": optimizer})
+    raced, whole = (evolved(config, racing=racing) for racing in (True, False))
+    assert_same(raced, whole)
+    assert sum(steps_of(raced)) < sum(steps_of(whole))
 
 
 def test_a_race_can_be_begun_and_given_up_on_the_way():

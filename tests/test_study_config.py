@@ -12,6 +12,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.scene.model_files import MODELS
 from evolution.run.lock import locked
+from evolution.settings.comparison import differences
 from evolution.settings.config_files import find_config, load_config
 from evolution.study.config import (
     SEEDS_MAX,
@@ -23,9 +24,9 @@ from evolution.study.config import (
 from evolution.study.data import load_study
 from evolution.study.directory import StudyDirectory
 from tests.processes import PATIENCE
-from tests.shipped import OPTIMIZERS
+from tests.shipped import OPTIMIZERS, PAPERS
 
-ROBOTS = {"paper": "epuck_planar", "quick": "epuck_kinematic", "wheels": "epuck"}
+ROBOTS = {"paper": "epuck_kinematic", "quick": "epuck_kinematic", "wheels": "epuck"}
 GA = "optimizer: {algorithm: genetic_algorithm}\n"
 
 
@@ -107,18 +108,60 @@ def test_other_seeds_are_refused(text, words):
 def test_shipped_studies_load(name):
     config = StudyConfig.load(find_study(name))
     assert list(config.experiments)[:3] == ["de-best", "de-rand", "ga"]
-    assert set(config.experiments) <= set(OPTIMIZERS)
     for experiment, each in config.experiments.items():
-        assert each.optimizer == load_config(find_config(experiment)).optimizer
-        assert each.evaluations <= 30_000
+        like = experiment.removesuffix("-37500")
+        assert each.optimizer == load_config(find_config(like)).optimizer
+        assert each.evaluations <= (30_000 if like == experiment else 37_500)
         assert each.robot == ROBOTS[name]
+
+
+def test_the_papers_study_has_every_optimizer_and_one_rule_for_champions():
+    experiments = StudyConfig.load(find_study("paper")).experiments
+    assert set(OPTIMIZERS) < set(experiments)
+    for name, each in experiments.items():
+        assert (each.climb, each.finalists, each.validation_starts) == (1, 0, 200)
+        assert each.test_starts == (1000 if name in PAPERS else 200)
+
+
+@pytest.mark.parametrize("study", ["variations", "steps-150", "steps-500"])
+def test_a_variation_differs_in_one_thing_from_its_algorithm(study):
+    experiments = StudyConfig.load(find_study(study)).experiments
+    # for all of the study
+    how = {"climb": 1.0, "finalists": 0, "test_starts": 200}
+    together = [
+        {"weight_bound", "weight_init"},
+        {"trials", "evaluations"},
+        # what is varied is the grid of the two
+        {"optimizer.scale", "optimizer.crossover"},
+        {"optimizer.bits", "optimizer.coding"},
+    ]
+    for name, varied in experiments.items():
+        like = next(each for each in PAPERS if name.startswith(each))
+        config = load_config(find_config(like)).model_copy(update=how)
+        keys = set(differences({"it": config, "varied": varied}))
+        if name == like:
+            assert not keys
+        else:
+            assert len(keys) == 1 or keys in together, (name, keys)
+        assert varied.budget == config.budget
+    names = set(experiments) - set(PAPERS)
+    assert study != "variations" or len(names) >= 60
+
+
+def test_climbing_is_de_best():
+    de_best = load_config(find_config("de-best"))
+    for each in StudyConfig.load(find_study("climbing")).experiments.values():
+        assert set(differences({"it": de_best, "varied": each})) <= {
+            "climb",
+            "finalists",
+        }
 
 
 def test_transfer_is_about_real_sensors_and_motors():
     config = StudyConfig.load(find_study("transfer"))
     for each in config.experiments.values():
         assert each.noise == "calibrated"
-        assert each.robot == "epuck_planar"
+        assert each.robot == "epuck_kinematic"
     assert any(each.randomise for each in config.experiments.values())
 
 
@@ -229,7 +272,10 @@ def test_a_study_is_shipped_or_a_file(here):
     for name in ("nope", "ga", "", ".", 300 * "a", "a\0b"):
         message = refused(find_study, name)
         assert message.startswith(f"no study '{name}'")
-        assert message.endswith("one of paper, quick, transfer, wheels")
+        assert message.endswith(
+            "one of climbing, paper, quick, steps-150, steps-500, transfer, "
+            "variations, wheels"
+        )
 
 
 # choosing and joining

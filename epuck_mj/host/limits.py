@@ -106,6 +106,13 @@ LIMITS: Mapping[str, Limit] = MappingProxyType(
         "memory": Limit(1, 1000),
         # 0 is the run's
         "budget": Limit(0, 100_000_000),
+        "crossover_points": Limit(1, 2),
+        "reevaluate_best": Limit(0, 100_000),
+        "pairs": COUNT,
+        "learning_rate": _above_0(2_000_000),
+        "weight_decay": SHARE,
+        "stochasticity": SHARE,
+        "refinements": Limit(0, 100_000),
         # controller files
         "n_genes": COUNT,
         "n_state": Limit(0, 100_000),

@@ -24,6 +24,8 @@ LABELS: Mapping[str, str] = {
     "one-plus-one-es": "(1+1)-ES",
     "one-plus-one-es-as-first-shipped": "(1+1)-ES, parents evaluated once",
     "random-search": "random search",
+    "openai-es": "OpenAI-ES",
+    "ssshc": "SSSHC",
     "de-best-calibrated": "DE/best/1/bin, calibrated",
     "de-best-randomised": "DE/best/1/bin, randomised",
     "ga-randomised": "GA, randomised",

@@ -17,10 +17,13 @@ from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.random import Generator
+from numpy.typing import ArrayLike
 
 from epuck_mj.host.limits import check
 from evolution.search.ask_tell import Optimizer, read_only
 from evolution.search.bounds import BOUNDS_RULES, check_bounds_rule
+from evolution.search.random_search import best_of
+from evolution.search.running_mean import running_mean
 from evolution.search.search_space import SearchSpace
 
 # i and three more, all distinct; both strategies draw the same three.
@@ -94,10 +97,15 @@ class DifferentialEvolutionParameters:
         reevaluate_parents: from the second generation on, evaluate parents and trial
             vectors together, and compare and store their new fitness only. A generation
             then costs 2 N evaluations.
+        reevaluate_best: from the second generation on, evaluate so many of the best
+            individuals again, together with the trial vectors. What is compared and
+            stored of an individual is the mean of all evaluations that it has had. A
+            generation costs so many evaluations more. Not with `reevaluate_parents`.
         algorithm: the algorithm's name in configurations.
 
     Raises:
-        ValueError: a value out of its range or an unknown name.
+        ValueError: a value out of its range, an unknown name, or both ways to evaluate
+            again.
     """
 
     strategy: str
@@ -106,6 +114,7 @@ class DifferentialEvolutionParameters:
     crossover: float
     bounds_rule: str = "midpoint"
     reevaluate_parents: bool = False
+    reevaluate_best: int = 0
     algorithm: Literal["differential_evolution"] = "differential_evolution"
     # read by the configuration: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
@@ -121,13 +130,24 @@ class DifferentialEvolutionParameters:
         check("scale", self.scale)
         check("crossover", self.crossover)
         check_bounds_rule(self.bounds_rule)
+        check("reevaluate_best", self.reevaluate_best)
+        if self.reevaluate_best > self.population:
+            raise ValueError(
+                f"reevaluate_best: expected 0 to population = {self.population}, "
+                f"got {self.reevaluate_best}"
+            )
+        if self.reevaluate_best and self.reevaluate_parents:
+            raise ValueError(
+                "reevaluate_best: expected 0 together with reevaluate_parents, "
+                f"got {self.reevaluate_best}"
+            )
 
 
 class DifferentialEvolution(Optimizer):
     """The optimiser 'de-best' or 'de-rand', by its strategy.
 
-    Its population are the survivors. Without `reevaluate_parents` their stored fitness
-    is for ever the one that let them in.
+    Its population are the survivors. Their stored fitness is for ever the one that let
+    them in, unless they are evaluated again.
     """
 
     def __init__(
@@ -142,44 +162,77 @@ class DifferentialEvolution(Optimizer):
         super().__init__(f"de-{parameters.strategy}", population, rng)
         self._parameters = parameters
         self._space = space
+        # evaluations that each individual has had, whose mean is stored
+        self._evaluations = np.ones(parameters.population, dtype=np.int64)
 
     def next_size(self) -> int:
         """See `Optimizer.next_size`."""
-        return len(self.population) * (2 if self._reevaluates() else 1)
+        return len(self.population) + len(self._reevaluated())
 
     def to_beat(self) -> np.ndarray:
         """See `Optimizer.to_beat`: a trial that does not beat its parent is forgotten.
 
-        Without a limit in the initial population and where parents are re-evaluated,
-        which changes what is to be beaten.
+        Without a limit in the initial population, for those who are evaluated again,
+        and for their trials, since it changes what these have to beat.
         """
-        asked = self.pending()
-        if self._reevaluates():
-            return np.full(len(asked), -np.inf)
-        return self.fitness.copy()
+        self.pending()
+        again = self._reevaluated()
+        parents = self.fitness.copy()
+        parents[again] = -np.inf
+        return np.concatenate([np.full(len(again), -np.inf), parents])
 
-    def _reevaluates(self) -> bool:
-        """Whether this generation asks parents and trials together."""
-        return self._parameters.reevaluate_parents and self.generation > 0
+    def _reevaluated(self) -> np.ndarray:
+        """Indices of those who are evaluated again in this generation, ascending."""
+        parameters = self._parameters
+        if self.generation == 0:
+            return np.arange(0)
+        if parameters.reevaluate_parents:
+            return np.arange(len(self.population))
+        return best_of(self.fitness, parameters.reevaluate_best)
 
     def propose(self) -> np.ndarray:
-        """The trials, after their parents if those are re-evaluated."""
-        trials = self._trials()
-        if self._reevaluates():
-            return np.concatenate([self.population, trials])
-        return trials
+        """The trials, after those who are evaluated again."""
+        return np.concatenate([self.population[self._reevaluated()], self._trials()])
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Let each trial replace its parent if it is strictly better."""
-        n = len(self.population)
+        n, again = len(self.population), self._reevaluated()
         # survivors carry the fitness they were compared with, -inf at first
-        parent_fitness = told[:n] if self._reevaluates() else self.fitness
+        parent_fitness = self.fitness.copy()
+        parent_fitness[again] = self._judged_again(again, told[: len(again)])
         trials, trial_fitness = asked[-n:], told[-n:]
         accepted = trial_fitness > parent_fitness
         self.population = read_only(
             np.where(accepted[:, np.newaxis], trials, self.population)
         )
         self.fitness = read_only(np.where(accepted, trial_fitness, parent_fitness))
+        self._evaluations[again] += 1
+        self._evaluations[accepted] = 1
+
+    def _judged_again(self, again: np.ndarray, told: np.ndarray) -> np.ndarray:
+        """Fitness `(n,)` of individuals `again` `(n,)` that were `told` `(n,)` anew."""
+        if self._parameters.reevaluate_parents:
+            return told
+        return running_mean(self.fitness[again], self._evaluations[again], told)
+
+    def judge_anew(self, fitness: ArrayLike) -> None:
+        """See `Optimizer.judge_anew`: means begin again."""
+        super().judge_anew(fitness)
+        self._evaluations[:] = 1
+
+    def load(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """See `Optimizer.load`."""
+        super().load(arrays)
+        if self._parameters.reevaluate_best:
+            self._evaluations = arrays["evaluations"]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """See `Optimizer.arrays`."""
+        arrays = super().arrays()
+        # without means it is of no use
+        if self._parameters.reevaluate_best:
+            arrays["evaluations"] = self._evaluations.copy()
+        return arrays
 
     def _trials(self) -> np.ndarray:
         """One trial for each individual `(population, genes)`."""

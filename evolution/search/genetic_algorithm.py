@@ -1,17 +1,18 @@
 """A generational genetic algorithm on binary chromosomes, maximising.
 
-Each gene is a fixed number of bits, plain binary, most significant first. A new
-generation is bred from the one last told: tournaments choose the parents, pairs of
-them are crossed at one point, bits are flipped. Nothing survives by itself unless
-`elites` is set. Randomness is drawn in this order: the initial bits, then for each
-generation the tournaments, the crossover, the mutation.
+Each gene is a fixed number of bits, plain binary or a Gray code, most significant
+first. A new generation is bred from the one last told: tournaments choose the parents,
+pairs of them are crossed at one point or at two, bits are flipped. Nothing survives by
+itself unless `elites` is set. Randomness is drawn in this order: the initial bits, then
+for each generation the tournaments, the crossover, the mutation.
 
 Source:
     Sections 2 and 4 of the paper: population, crossover and mutation rates. Bits per
-    gene, tournament size and the kind of crossover are this project's reading.
+    gene, their coding, tournament size and the kind of crossover are this project's
+    reading. The Gray code is the reflected one: F. Gray, US patent 2,632,058 (1953).
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -21,6 +22,21 @@ from numpy.random import Generator
 from epuck_mj.host.limits import check
 from evolution.search.ask_tell import Optimizer, read_only
 from evolution.search.search_space import SearchSpace
+
+
+def binary_of_gray(chromosomes: np.ndarray, bits: int) -> np.ndarray:
+    """Chromosomes `(..., genes * bits)` in plain binary, of those in Gray code.
+
+    A bit is set iff an odd number of bits of its gene are set in Gray code, up to and
+    with its own.
+
+    Args:
+        chromosomes: `(..., genes * bits)` of bool, the most significant bit first.
+        bits: per gene.
+    """
+    by_gene = chromosomes.reshape(*chromosomes.shape[:-1], -1, bits)
+    binary = np.logical_xor.accumulate(by_gene, axis=-1)
+    return binary.reshape(chromosomes.shape)
 
 
 def decode(
@@ -70,21 +86,64 @@ def one_point_crossover(
         rng: draws the points `(pairs,)` in 1 to length - 1, then who is crossed
             `(pairs,)`.
     """
-    first, second = parents[0::2], parents[1::2]
-    n_pairs, length = first.shape
+    n_pairs, length = len(parents) // 2, parents.shape[1]
     points = rng.integers(1, length, size=n_pairs)
     crossed = rng.random(n_pairs) < probability
     tail = np.arange(length) >= points[:, np.newaxis]
-    exchanged = tail & crossed[:, np.newaxis]
+    return _exchanged(parents, tail & crossed[:, np.newaxis])
+
+
+def two_point_crossover(
+    parents: np.ndarray, probability: float, rng: Generator
+) -> np.ndarray:
+    """Children `(2 * pairs, length)`: rows 2k and 2k + 1 with their middles exchanged.
+
+    The middle begins at one point and ends before the other; every two different points
+    are equally likely.
+
+    Args:
+        parents: `(2 * pairs, length)` of bool, length at least 3.
+        probability: that a pair is crossed at all.
+        rng: draws a point `(pairs,)` in 1 to length - 1, the other `(pairs,)` among
+            those that are left, then who is crossed `(pairs,)`.
+    """
+    n_pairs, length = len(parents) // 2, parents.shape[1]
+    one = rng.integers(1, length, size=n_pairs)
+    other = rng.integers(1, length - 1, size=n_pairs)
+    other += other >= one
+    crossed = rng.random(n_pairs) < probability
+    begin, end = np.minimum(one, other), np.maximum(one, other)
+    places = np.arange(length)
+    middle = (places >= begin[:, np.newaxis]) & (places < end[:, np.newaxis])
+    return _exchanged(parents, middle & crossed[:, np.newaxis])
+
+
+def _exchanged(parents: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """Children `(2 * pairs, length)` of pairs that exchange bits.
+
+    Args:
+        parents: `(2 * pairs, length)` of bool.
+        where: the bits that are exchanged `(pairs, length)`.
+    """
+    first, second = parents[0::2], parents[1::2]
     children = np.empty_like(parents)
-    children[0::2] = np.where(exchanged, second, first)
-    children[1::2] = np.where(exchanged, first, second)
+    children[0::2] = np.where(where, second, first)
+    children[1::2] = np.where(where, first, second)
     return children
+
+
+Crossover = Callable[[np.ndarray, float, Generator], np.ndarray]
+# (parents (2 * pairs, length), probability, rng) -> children
+CROSSOVERS: Mapping[int, Crossover] = {1: one_point_crossover, 2: two_point_crossover}
 
 
 def mutate(chromosomes: np.ndarray, probability: float, rng: Generator) -> np.ndarray:
     """Chromosomes `(n, length)` in which each bit is flipped with `probability`."""
     return chromosomes ^ (rng.random(chromosomes.shape) < probability)
+
+
+CODINGS = ("binary", "gray")
+"""Codings of a gene's level in bits."""
 
 
 @dataclass(frozen=True)
@@ -99,10 +158,13 @@ class GeneticAlgorithmParameters:
         mutation: probability in [0, 1] that a bit is flipped.
         elites: number of best individuals that enter the next generation unchanged.
             They are evaluated again, so an elite can lose its place by bad luck.
+        coding: of a gene's level in bits: binary, or gray, in which levels that follow
+            one another differ in one bit.
+        crossover_points: 1, tails are exchanged, or 2, middles are.
         algorithm: the algorithm's name in configurations.
 
     Raises:
-        ValueError: a value out of its range.
+        ValueError: a value out of its range or an unknown name.
     """
 
     population: int = 100
@@ -111,6 +173,8 @@ class GeneticAlgorithmParameters:
     crossover: float = 0.85
     mutation: float = 0.01
     elites: int = 0
+    coding: str = "binary"
+    crossover_points: int = 1
     algorithm: Literal["genetic_algorithm"] = "genetic_algorithm"
     # read by the configuration: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
@@ -120,6 +184,11 @@ class GeneticAlgorithmParameters:
         check("population", self.population, least=2)
         for name in ("bits", "tournament", "crossover", "mutation", "elites"):
             check(name, getattr(self, name))
+        check("crossover_points", self.crossover_points)
+        if self.coding not in CODINGS:
+            raise ValueError(
+                f"unknown coding {self.coding!r}; available: {', '.join(CODINGS)}"
+            )
         if self.elites >= self.population:
             raise ValueError(
                 f"elites: expected 0 to population - 1 = {self.population - 1}, "
@@ -142,12 +211,15 @@ class GeneticAlgorithm(Optimizer):
         """Draw the initial bits; `rng` belongs to the optimiser from here on.
 
         Raises:
-            ValueError: chromosomes of a single bit, or a space whose initial range is
-                not its bounds, which uniform bits cannot honour.
+            ValueError: chromosomes with fewer bits than parts to cross, or a space
+                whose initial range is not its bounds, which uniform bits cannot honour.
         """
         length = space.genes * parameters.bits
-        if length < 2:
-            raise ValueError("expected chromosomes of at least 2 bits to cross, got 1")
+        least = parameters.crossover_points + 1
+        if length < least:
+            raise ValueError(
+                f"expected chromosomes of at least {least} bits to cross, got {length}"
+            )
         if (space.init_lower, space.init_upper) != (space.lower, space.upper):
             raise ValueError(
                 f"ga begins with uniform bits: expected the initial range "
@@ -185,6 +257,8 @@ class GeneticAlgorithm(Optimizer):
 
     def _decoded(self, chromosomes: np.ndarray) -> np.ndarray:
         bits, space = self._parameters.bits, self._space
+        if self._parameters.coding == "gray":
+            chromosomes = binary_of_gray(chromosomes, bits)
         return decode(chromosomes, bits, space.lower, space.upper)
 
     def _offspring(self) -> np.ndarray:
@@ -200,6 +274,7 @@ class GeneticAlgorithm(Optimizer):
             self.fitness, n_parents, parameters.tournament, rng
         )
         parents = self._chromosomes[winners]
-        children = one_point_crossover(parents, parameters.crossover, rng)
+        cross = CROSSOVERS[parameters.crossover_points]
+        children = cross(parents, parameters.crossover, rng)
         children = mutate(children[:n_children], parameters.mutation, rng)
         return np.concatenate([elites, children])

@@ -41,14 +41,14 @@ class SearchSpace:
             )
 
 
-def refuse_wide_steps(sigma: float, space: SearchSpace) -> None:
+def refuse_wide_steps(sigma: float, space: SearchSpace, called: str = "sigma") -> None:
     """Refuse steps that are wider than the bounds.
 
     Raises:
-        ValueError: `sigma` exceeds their width.
+        ValueError: `sigma` exceeds their width; it is `called` so in the message.
     """
     width = space.upper - space.lower
     if sigma > width:
         raise ValueError(
-            f"sigma: expected at most {width}, the width of the bounds, got {sigma}"
+            f"{called}: expected at most {width}, the width of the bounds, got {sigma}"
         )

@@ -2,7 +2,7 @@
 
 Only this module imports all algorithms, which are one module each. They share
 `ask_tell` and `search_space`. The baselines beside the paper's are random search,
-(1+1)-ES, CMA-ES and L-SHADE.
+(1+1)-ES, CMA-ES, L-SHADE, OpenAI-ES and SSSHC.
 
     optimizer = make_optimizer(config.optimizer, config.search_space, rng)
     while spent + optimizer.next_size() <= budget:
@@ -35,8 +35,10 @@ from evolution.search.genetic_algorithm import (
     GeneticAlgorithmParameters,
 )
 from evolution.search.l_shade import LShade, LShadeParameters
+from evolution.search.openai_es import OpenAiEs, OpenAiEsParameters
 from evolution.search.random_search import RandomSearch, RandomSearchParameters
 from evolution.search.search_space import SearchSpace
+from evolution.search.ssshc import Ssshc, SsshcParameters
 
 __all__ = [
     "ALGORITHMS",
@@ -55,6 +57,8 @@ OptimizerParameters = (
     | EvolutionStrategyParameters
     | CmaEsParameters
     | LShadeParameters
+    | OpenAiEsParameters
+    | SsshcParameters
 )
 
 Maker = Callable[[Any, SearchSpace, Generator], Optimizer]
@@ -66,6 +70,8 @@ MAKERS: Mapping[type[OptimizerParameters], Maker] = {
     EvolutionStrategyParameters: EvolutionStrategy,
     CmaEsParameters: CmaEs,
     LShadeParameters: LShade,
+    OpenAiEsParameters: OpenAiEs,
+    SsshcParameters: Ssshc,
 }
 
 ALGORITHMS: Mapping[str, type[OptimizerParameters]] = {

@@ -31,8 +31,9 @@ def check_needs(config: ExperimentConfig) -> None:
 def needs(config: ExperimentConfig) -> Iterator[tuple[dict[str, int], int]]:
     """The largest arrays: numbers multiplied there, and bytes of each entry."""
     optimizer = config.optimizer
-    # a user's optimiser may have neither
-    key = "lineages" if hasattr(optimizer, "lineages") else "population"
+    # a user's optimiser may have none of them
+    keys = [each for each in ("lineages", "pairs") if hasattr(optimizer, each)]
+    key = keys[0] if keys else "population"
     individuals = getattr(optimizer, key, 1)
     if not isinstance(individuals, int) or individuals < 1:
         individuals = 1
