@@ -16,6 +16,7 @@ COMMANDS = {
     "evolution.study": "do many runs: every experiment with every seed",
     "evolution.report": "write tables and figures of a study",
     "evolution.margins": "test champions on robots that differ in one number",
+    "evolution.variations": "write a page about variations of the algorithms",
     "evolution.gap": "test champions in a hundred other worlds",
     "evolution.reproduce": "repeat the paper's comparison in one command",
     "evolution.verify": "test shipped champions again and compare the scores",

@@ -1,0 +1,117 @@
+"""The page of all variations: in which the paper's order comes back, and fitness."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Picture, Table
+from evolution.pages.words import (
+    LABELS,
+    NOTHING,
+    PAPERS,
+    numbered,
+    probability,
+    spread,
+)
+from evolution.reproduce.claims import REPLICATES
+from evolution.statistics.significance import FEWEST_FOR_STARS
+from evolution.variations.varied import UNCHANGED, Order, Varied
+
+
+def variations_page(
+    varied: Sequence[Varied], found: Sequence[Order], picture: Picture
+) -> list[Block]:
+    """The page's blocks."""
+    changes = [each for each in varied if each.change != UNCHANGED]
+    runs = sum(each.held_out.size for each in varied)
+    return [
+        Heading("Variations", 1),
+        Paragraph(
+            f"The paper's three algorithms with one thing changed at a time: "
+            f"{numbered(len(changes), 'variation')}, {numbered(runs, 'run')} in all. "
+            "Held-out fitness is the champion's mean on test starts on wheels. Best "
+            "stored fitness is what the paper reports."
+        ),
+        picture,
+        Heading("Does the paper's order come back?"),
+        *_orders(found),
+        Heading("Every variation"),
+        Paragraph(
+            "Shift: Hodges-Lehmann estimate against the unchanged algorithm with a "
+            "90 % interval. p: Mann-Whitney, Holm-adjusted for all variations of this "
+            f"page. Below {FEWEST_FOR_STARS} runs there is no verdict."
+        ),
+        *(_table(varied, algorithm) for algorithm in PAPERS),
+    ]
+
+
+def _orders(found: Sequence[Order]) -> list[Block]:
+    """Where the paper's order of best stored fitness comes back."""
+    names = " > ".join(LABELS[name] for name in PAPERS)
+    told = [order for order in found if order.fewest >= FEWEST_FOR_STARS]
+    back = sorted(
+        (order for order in told if order.possible or order.typical),
+        key=lambda order: -order.chance,
+    )
+    lines = [
+        f"{_title(order)}: p {order.chance:.2g}; medians "
+        + ", ".join(f"{median:.0f}" for median in order.medians)
+        + ("; the medians have the order" if order.typical else "")
+        for order in back
+    ]
+    text = (
+        f"The paper's order is {names} in best stored fitness. The probability that "
+        f"the best of {REPLICATES} of our runs each have it is above 5 % in "
+        f"{sum(order.possible for order in told)} of {len(told)} rows of the figure. "
+        f"The medians have it in {sum(order.typical for order in told)}. An algorithm "
+        "that a change does not concern is unchanged there."
+    )
+    return [Paragraph(text), *([Listing(lines)] if lines else [])]
+
+
+def _title(order: Order) -> str:
+    """What is changed, and in which algorithms."""
+    if order.change == UNCHANGED:
+        return "nothing changed"
+    where = ", ".join(LABELS[name] for name in order.varied)
+    return f"{order.change.replace('-', ' ')} ({where})"
+
+
+def _table(varied: Sequence[Varied], algorithm: str) -> Table:
+    """All variations of one algorithm."""
+    return Table(
+        (
+            LABELS[algorithm],
+            *("runs", "of", "held-out on wheels", "crash", "best stored"),
+            *("shift", "Holm p", "verdict"),
+        ),
+        [_row(each) for each in varied if each.algorithm == algorithm],
+    )
+
+
+def _row(each: Varied) -> tuple[str, ...]:
+    shift, p = NOTHING, NOTHING
+    if each.against is not None:
+        found = each.against
+        shift = f"{found.shift:z.1f} [{found.low:z.1f}, {found.high:z.1f}]"
+        p = probability(each.p).removeprefix("= ")
+    return (
+        each.change.replace("-", " "),
+        str(each.held_out.size),
+        str(each.steps),
+        spread(each.held_out),
+        f"{np.median(each.crash_rate):.0%}",
+        spread(each.stored),
+        shift,
+        p,
+        _verdict(each),
+    )
+
+
+def _verdict(each: Varied) -> str:
+    """What the runs say of a variation against the unchanged algorithm."""
+    if each.against is None or not each.enough:
+        return NOTHING
+    if each.differs:
+        return "better" if each.against.shift > 0 else "worse"
+    return "equivalent" if each.against.p < 0.05 else "undecided"
