@@ -21,6 +21,7 @@ from evolution.reproduce.claims import (
 from evolution.reproduce.first_generation import FirstGeneration, first_generation
 from evolution.reproduce.maturity import best_after, maturity, spent_until
 from evolution.reproduce.reproduction import reproduction
+from evolution.reproduce.settled import runs_needed
 from evolution.reproduce.verdicts import (
     CONSISTENT,
     INCONSISTENT,
@@ -451,3 +452,55 @@ def test_the_printed_equation_leaves_nothing_to_evolve():
     assert found["product"].best < 0.2 * 60
     near_walls = ("wall follower", "hugger")
     assert sum(found["literal"].behaviour[name] for name in near_walls) < 0.05
+
+
+# what is settled
+
+
+def pair_of(a: np.ndarray, b: np.ndarray):
+    (pair,) = comparisons_of({"a": a, "b": b}, lambda a, b: True, 10)
+    return pair
+
+
+def test_more_runs_are_needed_where_the_spread_is_wide_and_the_shift_near_the_margin():
+    base = 200 + 3 * np.arange(-10.0, 11)
+    narrow, wide = pair_of(base, base + 0.5), pair_of(base, base * 2 - 200 + 0.5)
+    middle = pair_of(base, base + 5)
+    few, more, most = (runs_needed(each) for each in (narrow, wide, middle))
+    assert few is not None and more is not None and most is not None
+    assert 21 < few < more
+    # as far from no difference as from the margin: twice as near as 0.5 is, so 4 times
+    assert 3 < most / few < 4.5
+    assert runs_needed(pair_of(np.full(10, 3.0), np.full(10, 3.0))) is None
+
+
+def test_so_many_runs_as_are_named_do_show_it():
+    rng = np.random.default_rng(0)
+    few = pair_of(*rng.normal([[200], [201]], 20, (2, 20)))
+    needed = runs_needed(few)
+    assert needed is not None
+    shift = few.equivalence.shift
+    shown = 0
+    for _ in range(200):
+        a, b = rng.normal([[200 + shift], [200]], 20, (2, needed))
+        pair = pair_of(a, b)
+        shown += pair.decided or pair.equivalent
+    assert shown > 120
+
+
+def test_the_page_says_what_is_settled_and_what_is_not():
+    data = study({"de-best": 237.0, "de-rand": 206.0, "ga": 236.0})
+    text = reproduction(data, None, [], "command")
+    settled, rest = text.split("## What is not settled, and what would settle it")
+    open_, _ = rest.split("## What there is")
+    line = "DE/best/1/bin earns more than DE/rand/1/bin: medians 237 and 206"
+    assert line in settled
+    assert "DE/best/1/bin and GA earn the same: they differ by less than 10 of 300" in (
+        settled
+    )
+    assert (
+        "- DE/rand/1/bin exceeds GA in best (stored) fitness\n"
+        in (settled.split("that do not hold here")[1])
+    )
+    assert "earns more, or both the same" not in open_
+    assert "undecided by these runs" in open_

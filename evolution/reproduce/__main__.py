@@ -17,7 +17,7 @@ from evolution.report.__main__ import report_study
 from evolution.study.__main__ import study
 
 QUICK = (("quick", "1-3"),)
-FULL = (("paper", "1-30"), ("wheels", "1-3"))
+FULL = (("paper", "1-100"),)
 """Studies and their seeds."""
 
 
@@ -34,9 +34,10 @@ class ReproduceOptions:
     Writes studies, reports and REPRODUCTION.md. Call it again to continue.
 
     Attributes:
-        quick: run three seeds with a twentieth of the budget, about 15 minutes on two
+        quick: run three seeds with a twentieth of the budget, about 2 minutes on two
             cores. Shows only that everything works.
-        full: run 30 seeds, and 3 seeds evolved on wheels, days on two cores.
+        full: run 100 seeds of the paper's algorithms and of all baselines, about 3
+            hours on two idle cores.
         output: directory for everything that is written.
         study: run nothing and report this study directory instead.
         wheels: with --study, the study directory of the runs evolved on wheels.
@@ -58,9 +59,9 @@ def reproduce_paper(argv: Sequence[str]) -> int:
         raise UserError("expected --study with --wheels")
     if [options.quick, options.full, options.study is not None].count(True) != 1:
         raise UserError(
-            "expected one of --quick (3 seeds, about 15 minutes on two cores), "
-            "--full (30 seeds, days on two cores) and --study (write the verdict on a "
-            "study that is there)"
+            "expected one of --quick (3 seeds, about 2 minutes on two cores), --full "
+            "(100 seeds, about 3 hours on two idle cores) and --study (write the "
+            "verdict on a study that is there)"
         )
     study_names = [each.name for each in (options.study, options.wheels) if each]
     if len(set(study_names)) < len(study_names):

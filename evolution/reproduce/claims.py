@@ -96,10 +96,16 @@ def claims(study: StudyData) -> list[Claim]:
     return _of_the_paper(study, found)
 
 
+def held_out_pairs(study: StudyData, robot: str) -> list[Comparison]:
+    """The paper's algorithms against each other in held-out fitness on a robot."""
+    held_out = samples_of(study, lambda name: study.held_out(name, robot))
+    return _pairs(study, held_out, MARGIN * study.steps)
+
+
 def held_out_order(study: StudyData, robot: str) -> list[Claim]:
     """Test the paper's order of algorithms on held-out fitness, as the report does."""
     held_out = samples_of(study, lambda name: study.held_out(name, robot))
-    rows = _pairs(study, held_out, MARGIN * study.steps)
+    rows = held_out_pairs(study, robot)
     found = _orders(rows, held_out, f"in held-out fitness on {robot}")
     return _of_the_paper(study, found)
 
