@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from epuck_mj.errors import UserError
+from epuck_mj.policies.topology import Topology
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene, load_scene
@@ -19,7 +20,7 @@ from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.trials.behaviour_classes import class_shares
 from epuck_mj.trials.metrics import behaviour_of
 from epuck_mj.trials.recorder import record_tracks
-from evolution.judging.evaluation import CAPACITY
+from evolution.judging.evaluation import CAPACITY, BatchEngine, evaluate
 from evolution.judging.held_out_starts import starts_for_test
 from evolution.judging.scores import HeldOut
 from evolution.settings.setting import Setting
@@ -139,6 +140,17 @@ class Judge:
     def starts(self, n: int) -> np.ndarray:
         """The first of the test starts of this scene, `(n, 3)`."""
         return starts_for_test(self._space, n)
+
+    def fitness(self, topology: Topology, genome: np.ndarray, n: int) -> float:
+        """Mean fitness of a genome `(genes,)` on the first `n` test starts.
+
+        The mean of `test` on ideal robots, without what is measured of behaviour, which
+        costs far more on the kinematic robot.
+        """
+        engine = BatchEngine(self.scene, self._task, self._threads)
+        return float(
+            evaluate(engine, topology, genome[None], self.starts(n)).fitness[0]
+        )
 
     def test(
         self,

@@ -109,12 +109,12 @@ def judged(
     tell("Testing the individual of the highest fitness")
     genome, believed = most_believed(stored)
     where = WHEELED_ROBOT if evolution.climbed else Path(config.robot).name
-    worth = judges[where].test(config.topology.decode(genome), n)
+    worth = judges[where].fitness(config.topology, genome, n)
     scores = Scores(
         stored=champion.stored_fitness,
         validation=champion.validation_fitness,
         held_out=held_out,
-        most_believed=Believed(stored=believed, held_out=worth.mean, robot=where),
+        most_believed=Believed(stored=believed, held_out=worth, robot=where),
     )
     if as_evolved:
         scores = scores.model_copy(update={"held_out_as_evolved": as_evolved})
