@@ -17,7 +17,7 @@ from evolution.pages.blocks import (
 )
 from evolution.pages.words import SPREAD, label, median_and_quartiles, spread
 from evolution.report.measures import shown_robots
-from evolution.report.samples import kept, most_believed_fitness
+from evolution.report.samples import believed_on, kept, most_believed_fitness
 from evolution.reproduce.claim import Claim
 from evolution.reproduce.claims import (
     REPLICATES,
@@ -173,7 +173,7 @@ def _claims(found: Sequence[Claim]) -> Table:
 
 def _hidden(study: StudyData) -> list[Block]:
     """Blocks about the individuals with the highest stored fitness."""
-    robot, rows = study.robots[0], []
+    robot, rows = believed_on(study), []
     for name, runs in study.runs.items():
         stored, held_out = most_believed_fitness(study, name)
         if stored.size:
@@ -191,7 +191,7 @@ def _hidden(study: StudyData) -> list[Block]:
     return [
         Paragraph(
             "The individual with the highest stored fitness of each run, which is what "
-            f"the paper reports, and what 1,000 fresh starts on {robot} say of it; "
+            f"the paper reports, and what fresh starts on {robot} say of it; "
             f"then the champion, chosen on validation starts. {SPREAD}."
         ),
         Table(
