@@ -16,6 +16,7 @@ COMMANDS = {
     "evolution.study": "do many runs: every experiment with every seed",
     "evolution.report": "write tables and figures of a study",
     "evolution.gap": "test champions in a hundred other worlds",
+    "evolution.export": "write the controller file of a run in a study's tables",
     "evolution.reproduce": "repeat the paper's comparison in one command",
     "evolution.verify": "test shipped champions again and compare the scores",
 }

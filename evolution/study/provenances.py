@@ -1,0 +1,103 @@
+"""provenance.json of a study: each distinct provenance of its runs, once."""
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from epuck_mj.errors import UserError
+from epuck_mj.host import files
+from epuck_mj.host.yaml_and_json import read_json
+from evolution.run.provenance import check_provenance
+
+OWN = ("started", "finished", "resumed")
+"""What is another value in every run."""
+
+CHANGES_NOTHING = "threads"
+"""What may differ between runs of one provenance: it changes no result."""
+
+
+def provenance_of(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """The provenance of a run as an entry of provenance.json.
+
+    Args:
+        fields: as `RunDirectory.provenance_fields` gives them.
+    """
+    parts = [fields, *fields.get("resumed", ())]
+    first, *others = map(_shared, parts)
+    entry = dict(first)
+    # of the times that it was gone on with, those under other circumstances
+    differing: list[dict[str, Any]] = []
+    for part in others:
+        if part != first and part not in differing:
+            differing.append(part)
+    if differing:
+        entry["resumed"] = differing
+    text = json.dumps(entry, sort_keys=True)
+    name = hashlib.sha256(text.encode()).hexdigest()[:12]
+    threads = {p[CHANGES_NOTHING] for p in parts if p.get(CHANGES_NOTHING) is not None}
+    return {
+        "id": name,
+        **entry,
+        CHANGES_NOTHING: sorted(threads),
+        "started": fields.get("started"),
+        "finished": fields.get("finished"),
+    }
+
+
+def _shared(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """What runs of one provenance have in common."""
+    aside = (*OWN, CHANGES_NOTHING)
+    return {key: value for key, value in fields.items() if key not in aside}
+
+
+def together(entries: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Entries by id; of equal ones, the first start and the last finish."""
+    found: dict[str, dict[str, Any]] = {}
+    for entry in entries:
+        known = found.setdefault(entry["id"], dict(entry))
+        threads = {*known[CHANGES_NOTHING], *entry[CHANGES_NOTHING]}
+        known[CHANGES_NOTHING] = sorted(threads)
+        for key, choose in (("started", min), ("finished", max)):
+            times = [each[key] for each in (known, entry) if each.get(key)]
+            known[key] = choose(times, default=None)
+    return found
+
+
+def write_provenances(
+    path: Path, entries: Mapping[str, Mapping[str, Any]], of_runs: Iterable[str]
+) -> None:
+    """Write the provenances of runs, in the order of the runs.
+
+    Args:
+        path: of the file.
+        entries: by id.
+        of_runs: ids of the provenances of all runs.
+    """
+    counts = Counter(of_runs)
+    listed = [{**entries[name], "runs": n} for name, n in counts.items()]
+    files.write_text(path, json.dumps({"provenances": listed}, indent=1) + "\n")
+
+
+def read_provenances(path: Path) -> dict[str, dict[str, Any]]:
+    """What `write_provenances` wrote, by id; empty if there is no file.
+
+    Raises:
+        UserError: if it is damaged.
+    """
+    if not files.is_file(path):
+        return {}
+    listed = read_json(path).get("provenances")
+    if not isinstance(listed, list):
+        raise UserError(f"'{path}' is damaged: expected a list of provenances")
+    found: dict[str, dict[str, Any]] = {}
+    for entry in listed:
+        if not isinstance(entry, dict) or not isinstance(entry.get("id"), str):
+            raise UserError(f"'{path}' is damaged: expected objects with an id")
+        check_provenance(entry, path)
+        if not isinstance(entry.get(CHANGES_NOTHING), list):
+            raise UserError(f"'{path}' is damaged: expected a list of threads")
+        found[entry["id"]] = entry
+    return found
