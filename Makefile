@@ -49,7 +49,7 @@ bridge: $(INSTALLED)
 # champions of three seeds of each experiment in other worlds, kinematic and on wheels
 gap: $(INSTALLED)
 	$(BIN)/python -m evolution.gap \
-	  $(wildcard $(PAPERS:%=results/paper/%/seed-[123])) \
+	  $(foreach seed,1 2 3,$(PAPERS:%=results/paper/%/seed-$(seed))) \
 	  results/transfer wall-follower --output results/gap
 
 # what git keeps of the studies in runs/, and everything that is made of it

@@ -7,12 +7,10 @@ from typing import Annotated
 
 import tyro
 
-from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse, word
-from epuck_mj.policies.file import load_controller
 from evolution.run.directory import RunDirectory
-from evolution.study.addresses import PlacedRun, runs_at
+from evolution.study.addresses import champion_at, run_at
 
 CONFIG = (".yaml", ".yml")
 """Endings of files that get the config."""
@@ -43,27 +41,16 @@ def export(argv: Sequence[str]) -> int:
     """Run the command line; its exit status."""
     options = parse(Options, "python -m evolution.export", argv, examples=EXAMPLES)
     files.check_writable(options.file)
-    found = runs_at(options.run)
-    if len(found) != 1:
-        raise UserError(
-            f"expected one run, the directory of a run or STUDY/EXPERIMENT/seed-N, got "
-            f"{len(found)} at '{options.run}'"
-        )
-    text = _config(found[0]) if options.file.suffix in CONFIG else _champion(found[0])
+    if options.file.suffix in CONFIG:
+        run = run_at(options.run)
+        in_folder = isinstance(run, RunDirectory)
+        text = (run.stored_config() if in_folder else run.config).to_yaml()
+    else:
+        text = champion_at(options.run).to_json()
     with files.writing():
         files.write_text(options.file, text)
     print(f"Written: {options.file}")
     return 0
-
-
-def _config(run: PlacedRun) -> str:
-    config = run.stored_config() if isinstance(run, RunDirectory) else run.config
-    return config.to_yaml()
-
-
-def _champion(run: PlacedRun) -> str:
-    in_folder = isinstance(run, RunDirectory)
-    return (load_controller(run.path) if in_folder else run.champion).to_json()
 
 
 if __name__ == "__main__":

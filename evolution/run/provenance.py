@@ -95,7 +95,9 @@ class _Provenance(BaseModel, frozen=True, strict=True):
     git: _Git | None = None
     mjcf_sha256: dict[str, str] = {}
     own_sha256: dict[str, str] = {}
+    threads: int | list[int] | None = None
     processor: _Processor = _Processor()
+    started: str | None = None
     finished: str | None = None
     resumed: list["_Provenance"] = []
 

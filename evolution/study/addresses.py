@@ -6,7 +6,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Union
 
+from epuck_mj.errors import UserError
 from epuck_mj.host import files
+from epuck_mj.policies.file import ControllerFile, load_controller
 from evolution.run.directory import RunDirectory
 from evolution.study.directory import PREFIX, RUNNING, StudyDirectory
 
@@ -41,6 +43,31 @@ def runs_at(place: Path, histories: bool = False) -> list[PlacedRun]:
         return []
     found = study.tables.runs(study.stored_config(), histories)
     return [found[run] for run in [(name, int(number))] if run in found]
+
+
+def champion_at(place: Path) -> ControllerFile:
+    """The champion of the one run at an address.
+
+    Raises:
+        UserError: if there is no run, or more than one, or it has no champion.
+    """
+    run = run_at(place)
+    return load_controller(run.path) if isinstance(run, RunDirectory) else run.champion
+
+
+def run_at(place: Path) -> PlacedRun:
+    """The one run at an address.
+
+    Raises:
+        UserError: if there is none, or more than one.
+    """
+    found = runs_at(place)
+    if len(found) != 1:
+        raise UserError(
+            "expected one run, the directory of a run or STUDY/EXPERIMENT/seed-N, got "
+            f"{len(found)} at '{place}'"
+        )
+    return found[0]
 
 
 def _of_study(study: StudyDirectory, histories: bool) -> list[PlacedRun]:

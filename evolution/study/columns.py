@@ -173,6 +173,8 @@ def rows_of(table: pa.Table) -> list[Row]:
         # a column that a person has added
         if stored is not None:
             columns[tuple(json.loads(stored))] = column.to_pylist()
+    if not columns:
+        raise ValueError("expected columns as evolution.study writes them")
     missing = [place for place in FIRST if place not in columns]
     if missing:
         raise ValueError(f"it has no column {'_'.join(missing[0])}")

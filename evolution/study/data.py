@@ -130,7 +130,7 @@ def load_study(path: Path) -> StudyData:
     """
     directory = StudyDirectory(path)
     config = directory.stored_config()
-    packed = directory.tables.runs(config)
+    packed, damaged = directory.tables.sound_runs(config)
     runs: dict[str, tuple[RunData, ...]] = {}
     missing: list[str] = []
     tested: tuple[str, ...] = ()
@@ -144,6 +144,8 @@ def load_study(path: Path) -> StudyData:
             places.setdefault(seed, []).append(place)
         for seed in seeds:
             try:
+                if (name, seed) in damaged:
+                    raise damaged[name, seed]
                 run = packed.get((name, seed)) or _unpacked(
                     places[seed], name, config.with_seed(name, seed)
                 )

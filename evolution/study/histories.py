@@ -1,5 +1,6 @@
 """The table of histories, history.parquet: a row per run and generation."""
 
+import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -8,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from epuck_mj.errors import UserError
+from epuck_mj.host import files
 from evolution.run.directory import RunDirectory
 from evolution.run.history import (
     CLIMBED,
@@ -45,43 +47,58 @@ History = Mapping[str, np.ndarray]
 the robot, and those of `COUNTED`."""
 
 
-def history_of(directory: RunDirectory, robot: str) -> History:
-    """The history of a run from its directory.
+def history_of(directory: RunDirectory, robot: str) -> tuple[History, str]:
+    """The history of a run from its directory, and what of it is not known.
 
     Args:
         directory: of the run.
         robot: with which it began, which older histories do not say.
 
+    Returns:
+        It, and a line if timing.csv cannot be read: only `COUNTED` is lost then.
+
     Raises:
-        UserError: if it cannot be read, or is damaged.
+        UserError: if history.csv cannot be read, or is damaged.
     """
     columns = read_history(directory.history)
-    robots = csv_columns(table_text(directory.history)).get(ROBOT)
+    robots = csv_columns(files.read_text(directory.history)).get(ROBOT)
     n = len(columns["generation"])
-    counted = csv_columns(table_text(directory.timing))
+    counted, note = {name: np.full(n, np.nan) for name in COUNTED}, ""
     try:
-        found = {name: np.full(n, np.nan) for name in COUNTED}
-        # in older files a generation that was done twice stands twice
-        for name, values in found.items():
-            texts = counted.get(name, [])
-            for number, text in zip(counted.get("generation", []), texts, strict=False):
-                if text:
-                    values[int(number)] = float(text)
-    except (ValueError, IndexError) as error:
-        raise UserError(f"'{directory.timing}' is damaged: {error}") from None
-    return {**columns, ROBOT: np.array(robots or [robot] * n), **found}
+        for name, values in counted.items():
+            for generation, value in _of_generations(directory.timing, name).items():
+                values[range(n)[generation]] = value
+    except (UserError, ValueError, IndexError) as error:
+        note = f"'{directory.timing}' is damaged: {error}"
+        counted = {name: np.full(n, np.nan) for name in COUNTED}
+    return {**columns, ROBOT: np.array(robots or [robot] * n), **counted}, note
 
 
 def seconds_of(directory: RunDirectory) -> float:
     """Seconds of all generations of a run whose time is known."""
-    columns = csv_columns(table_text(directory.timing))
-    numbers, texts = (columns.get(name, []) for name in ("generation", "seconds"))
-    # the last of a generation that was done twice
-    each = dict(zip(numbers, texts, strict=False))
     try:
-        return sum(float(text) for text in each.values() if text)
-    except ValueError as error:
-        raise UserError(f"'{directory.timing}' is damaged: {error}") from None
+        return sum(_of_generations(directory.timing, "seconds").values())
+    except (UserError, ValueError):
+        return 0.0
+
+
+def _of_generations(timing: Path, column: str) -> dict[int, float]:
+    """What timing.csv says, by generation; the last of one that was done twice.
+
+    Raises:
+        UserError: if it cannot be read.
+        ValueError: if it says something else.
+    """
+    columns = csv_columns(table_text(timing))
+    numbers, texts = (columns.get(name, []) for name in ("generation", column))
+    found = {
+        int(number): float(text)
+        for number, text in zip(numbers, texts, strict=False)
+        if text
+    }
+    if not all(math.isfinite(value) for value in found.values()):
+        raise ValueError(f"expected finite {column}")
+    return found
 
 
 def history_table(histories: Mapping[Run, History]) -> pa.Table:

@@ -105,8 +105,8 @@ def read_packed(
     # the tables say neither of these: the study's config does
     if (champion.task, champion.network) != (config.task, config.topology):
         raise UserError(f"'{directory.champion}' is of another task or network")
-    history = history_of(directory, Path(config.robot).name)
-    believed, note = _most_believed(directory, history, config.topology.n_genes)
+    history, lost_counts = history_of(directory, Path(config.robot).name)
+    believed, lost_genome = _most_believed(directory, history, config.topology.n_genes)
     return PackedRun(
         experiment=experiment,
         config=config,
@@ -117,7 +117,7 @@ def read_packed(
         provenance=provenance_of(directory.provenance_fields()),
         path=directory.path,
         seconds=seconds_of(directory),
-        note=note,
+        note="; ".join(filter(None, (lost_counts, lost_genome))),
     )
 
 
@@ -149,6 +149,7 @@ def run_of_row(
     config: ExperimentConfig,
     provenance: Mapping[str, Any],
     history: History,
+    seconds: float,
 ) -> PackedRun:
     """A run from its row.
 
@@ -158,6 +159,7 @@ def run_of_row(
         config: of the run, seed included.
         provenance: of the run.
         history: of the run; empty if it is not asked for.
+        seconds: of its generations; 0 if not known.
 
     Raises:
         UserError: if the row is damaged.
@@ -194,6 +196,7 @@ def run_of_row(
         history=history,
         provenance=provenance,
         path=path,
+        seconds=seconds,
     )
 
 

@@ -37,11 +37,11 @@ def provenance_of(fields: Mapping[str, Any]) -> dict[str, Any]:
         entry["resumed"] = differing
     text = json.dumps(entry, sort_keys=True)
     name = hashlib.sha256(text.encode()).hexdigest()[:12]
-    threads = {p[CHANGES_NOTHING] for p in parts if p.get(CHANGES_NOTHING) is not None}
+    threads = {part.get(CHANGES_NOTHING) for part in parts}
     return {
         "id": name,
         **entry,
-        CHANGES_NOTHING: sorted(threads),
+        CHANGES_NOTHING: sorted(threads - {None}),
         "started": fields.get("started"),
         "finished": fields.get("finished"),
     }

@@ -87,46 +87,67 @@ class Tables:
             histories: whether to read these, too.
 
         Raises:
-            UserError: if the tables are damaged.
+            UserError: if anything in the tables is damaged.
+        """
+        found, damaged = self.sound_runs(config, histories)
+        for error in damaged.values():
+            raise error
+        return found
+
+    def sound_runs(
+        self, config: StudyConfig, histories: bool = True
+    ) -> tuple[dict[Run, PackedRun], dict[Run, UserError]]:
+        """The runs as `runs` gives them, and what is wrong with the rows of others.
+
+        Raises:
+            UserError: if a table as a whole is damaged.
         """
         rows = self.rows()
         read = self.histories() if rows and histories else {}
-        provenances = read_provenances(self.provenance)
+        provenances, seconds = read_provenances(self.provenance), self.seconds()
         found: dict[Run, PackedRun] = {}
+        damaged: dict[Run, UserError] = {}
         for row in rows:
             if ("experiment",) not in row or ("seed",) not in row:
                 raise UserError(f"'{self.champions}' is damaged: a row names no run")
-            name, seed = _run(row)
+            run = name, seed = _run(row)
             if name not in config.experiments:
                 continue
-            if (name, seed) in found:
+            if run in found or run in damaged:
                 raise UserError(
                     f"'{self.champions}' is damaged: it has {name} seed {seed} twice"
                 )
-            if histories and (name, seed) not in read:
-                raise UserError(f"'{self.history}' has no run {name} seed {seed}")
-            found[name, seed] = run_of_row(
-                row,
-                self.study,
-                config.with_seed(name, seed),
-                provenances.get(row.get(("provenance",), ""), {}),
-                read.get((name, seed), {}),
-            )
-        return found
+            try:
+                if histories and run not in read:
+                    raise UserError(f"'{self.history}' does not have it")
+                found[run] = run_of_row(
+                    row,
+                    self.study,
+                    config.with_seed(name, seed),
+                    provenances.get(row.get(("provenance",), ""), {}),
+                    read.get(run, {}),
+                    seconds.get(run, 0.0),
+                )
+            except UserError as error:
+                damaged[run] = error
+        return found, damaged
 
-    def add(self, runs: Sequence[PackedRun], order: Sequence[str]) -> None:
-        """Write finished runs into the tables; those that are there already stay.
+    def add(
+        self, runs: Sequence[PackedRun], order: Sequence[str], again: bool = False
+    ) -> None:
+        """Write finished runs into the tables.
 
         Args:
             runs: to be added, with histories.
             order: names of all experiments, as the study has them.
+            again: whether to replace runs that are there already, which stay else.
 
         Raises:
             OSError: if the tables cannot be written; what was there is intact.
             UserError: if what is there is damaged.
         """
         rows = {_run(row): row for row in self.rows()}
-        new = [run for run in runs if (run.experiment, run.seed) not in rows]
+        new = [run for run in runs if again or (run.experiment, run.seed) not in rows]
         rows |= {(run.experiment, run.seed): run.row for run in new}
         # experiments that the study does not name any more stay, at the end
         others = sorted({name for name, _ in rows} - set(order))
@@ -141,7 +162,7 @@ class Tables:
             before = read_table(self.history, SCHEMA.names)
             parts.insert(0, checked(before, self.history))
         seconds = self.seconds() | {
-            (run.experiment, run.seed): f"{run.seconds:.3f}" for run in new
+            (run.experiment, run.seed): run.seconds for run in new
         }
         # the last one counts: after a kill in between the runs are added anew
         write_provenances(self.provenance, known, [id for id in used if id in known])
@@ -149,23 +170,29 @@ class Tables:
         write_table(self.history, merged(parts, kept, list(rank)))
         write_table(self.champions, table_of([rows[run] for run in kept]))
 
-    def seconds(self) -> dict[Run, str]:
-        """Seconds of the generations of each run, as timing.csv has them."""
+    def seconds(self) -> dict[Run, float]:
+        """Seconds of the generations of each run, as timing.csv has them.
+
+        Raises:
+            UserError: if it is damaged.
+        """
         columns = csv_columns(table_text(self.timing))
         texts = (columns.get(name, []) for name in TIMING)
-        return {
-            (name, int(seed)): seconds
-            for name, seed, seconds in zip(*texts, strict=True)
-            if seed.isdecimal()
-        }
+        try:
+            return {
+                (name, int(seed)): float(seconds)
+                for name, seed, seconds in zip(*texts, strict=True)
+            }
+        except ValueError as error:
+            raise UserError(f"'{self.timing}' is damaged: {error}") from None
 
 
 TIMING = ("experiment", "seed", "seconds")
 """Columns of timing.csv."""
 
 
-def _write_seconds(path: Path, seconds: Mapping[Run, str]) -> None:
-    lines = [f"{name},{seed},{text}\n" for (name, seed), text in seconds.items()]
+def _write_seconds(path: Path, seconds: Mapping[Run, float]) -> None:
+    lines = [f"{name},{seed},{time:.3f}\n" for (name, seed), time in seconds.items()]
     files.write_text(path, "".join([",".join(TIMING), "\n", *lines]))
 
 

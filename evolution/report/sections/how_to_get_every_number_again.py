@@ -15,7 +15,7 @@ def commands(data: StudyData, output: str, ioh: bool) -> dict[str, str]:
     study = data.path.as_posix()
     run = next(run for runs in data.runs.values() for run in runs)
     name = next(name for name, runs in data.runs.items() if run in runs)
-    config, again = f"runs/{name}-{run.seed}.yaml", ["--ioh"] if ioh else []
+    config, again = f"again-{name}-{run.seed}.yaml", ["--ioh"] if ioh else []
     return {
         "this report": command_line(
             "evolution.report", study, "--output", output, *again
