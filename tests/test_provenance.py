@@ -38,8 +38,12 @@ FIRST = {
 
 
 def test_runs_of_one_provenance_share_an_entry(tmp_path):
-    """Times and threads do not make another one; whatever may change results does."""
-    later = FIRST | {"threads": 2, "finished": "2026-01-02T00:00:00+00:00"}
+    """Whatever may change results makes another one; times, threads, commands do not."""
+    later = FIRST | {
+        "threads": 2,
+        "argv": ["my own"],
+        "finished": "2026-01-02T00:00:00+00:00",
+    }
     gone_on = FIRST | {"resumed": [later, FIRST]}
     other = FIRST | {"git": {"commit": "def", "modified": False}}
     elsewhere = FIRST | {"resumed": [other, later, other]}
@@ -49,6 +53,7 @@ def test_runs_of_one_provenance_share_an_entry(tmp_path):
     assert first != last
     found = together(entries)
     assert found[first]["threads"] == [1, 2]
+    assert found[first]["commands"] == ["'my own'", "paper"]
     assert found[first]["started"] == FIRST["started"]
     assert found[first]["finished"] == later["finished"]
     assert [each["git"] for each in found[last]["resumed"]] == [other["git"]]

@@ -91,6 +91,7 @@ class _Provenance(BaseModel, frozen=True, strict=True):
     """What a provenance file says, if it says it."""
 
     argv: list[str] = []
+    commands: list[str] = []
     versions: dict[str, str] = {}
     git: _Git | None = None
     mjcf_sha256: dict[str, str] = {}

@@ -1,7 +1,13 @@
-"""provenance.json of a study: each distinct provenance of its runs, once."""
+"""provenance.json of a study: each distinct provenance of its runs, once.
+
+Runs share a provenance if whatever may change their results is the same: code,
+versions, models and processor. So its id, which the table of champions gives, is the
+same for the same study, whatever it is called and however often it was interrupted.
+"""
 
 import hashlib
 import json
+import shlex
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -12,11 +18,14 @@ from epuck_mj.host import files
 from epuck_mj.host.yaml_and_json import read_json
 from evolution.run.provenance import check_provenance
 
-OWN = ("started", "finished", "resumed")
-"""What is another value in every run."""
+THREADS, COMMANDS = "threads", "commands"
+"""What may differ between runs of one provenance: lists of all that were used.
 
-CHANGES_NOTHING = "threads"
-"""What may differ between runs of one provenance: it changes no result."""
+A command is the text of a run's `argv`.
+"""
+
+OWN = ("started", "finished", "resumed", "argv", THREADS)
+"""What belongs to a run alone."""
 
 
 def provenance_of(fields: Mapping[str, Any]) -> dict[str, Any]:
@@ -37,11 +46,13 @@ def provenance_of(fields: Mapping[str, Any]) -> dict[str, Any]:
         entry["resumed"] = differing
     text = json.dumps(entry, sort_keys=True)
     name = hashlib.sha256(text.encode()).hexdigest()[:12]
-    threads = {part.get(CHANGES_NOTHING) for part in parts}
+    threads = {part.get(THREADS) for part in parts}
+    commands = {shlex.join(part["argv"]) for part in parts if part.get("argv")}
     return {
         "id": name,
         **entry,
-        CHANGES_NOTHING: sorted(threads - {None}),
+        COMMANDS: sorted(commands),
+        THREADS: sorted(threads - {None}),
         "started": fields.get("started"),
         "finished": fields.get("finished"),
     }
@@ -49,8 +60,7 @@ def provenance_of(fields: Mapping[str, Any]) -> dict[str, Any]:
 
 def _shared(fields: Mapping[str, Any]) -> dict[str, Any]:
     """What runs of one provenance have in common."""
-    aside = (*OWN, CHANGES_NOTHING)
-    return {key: value for key, value in fields.items() if key not in aside}
+    return {key: value for key, value in fields.items() if key not in OWN}
 
 
 def together(entries: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -58,8 +68,8 @@ def together(entries: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {}
     for entry in entries:
         known = found.setdefault(entry["id"], dict(entry))
-        threads = {*known[CHANGES_NOTHING], *entry[CHANGES_NOTHING]}
-        known[CHANGES_NOTHING] = sorted(threads)
+        for key in (COMMANDS, THREADS):
+            known[key] = sorted({*known[key], *entry[key]})
         for key, choose in (("started", min), ("finished", max)):
             times = [each[key] for each in (known, entry) if each.get(key)]
             known[key] = choose(times, default=None)
@@ -97,7 +107,8 @@ def read_provenances(path: Path) -> dict[str, dict[str, Any]]:
         if not isinstance(entry, dict) or not isinstance(entry.get("id"), str):
             raise UserError(f"'{path}' is damaged: expected objects with an id")
         check_provenance(entry, path)
-        if not isinstance(entry.get(CHANGES_NOTHING), list):
-            raise UserError(f"'{path}' is damaged: expected a list of threads")
+        for key in (COMMANDS, THREADS):
+            if not isinstance(entry.get(key), list):
+                raise UserError(f"'{path}' is damaged: expected a list of {key}")
         found[entry["id"]] = entry
     return found

@@ -1,6 +1,5 @@
 """How to get every number again: files, commands, and where the runs came from."""
 
-import shlex
 from typing import Any
 
 from epuck_mj.policies.wall_follower import YARDSTICK
@@ -38,10 +37,11 @@ def commands(data: StudyData, output: str, ioh: bool) -> dict[str, str]:
 
 def origins(data: StudyData) -> dict[str, list[Any]]:
     """Commits, versions, processors and arguments of all runs, each once, sorted."""
-    found: dict[str, set[Any]] = {key: set() for key in ORIGINS}
+    found: dict[str, set[Any]] = {key: set() for key in (*ORIGINS, "argv")}
     for runs in data.runs.values():
         for run in runs:
             fields = run.provenance
+            found["argv"] |= set(fields.get("commands", ()))
             for part in (fields, *fields.get("resumed", ())):
                 for key, read in ORIGINS.items():
                     if part.get(key):
@@ -53,7 +53,6 @@ ORIGINS = {
     "git": lambda git: git["commit"] + (" and changes" if git["modified"] else ""),
     "versions": lambda versions: ", ".join(f"{k} {v}" for k, v in versions.items()),
     "processor": lambda processor: str(processor.get("model")),
-    "argv": lambda argv: shlex.join(argv),
 }
 """Parts of a run's provenance that a report gives, and their texts."""
 
