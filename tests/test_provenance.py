@@ -38,7 +38,7 @@ FIRST = {
 
 
 def test_runs_of_one_provenance_share_an_entry(tmp_path):
-    """Whatever may change results makes another one; times, threads, commands do not."""
+    """What may change results makes another one; times, threads, commands do not."""
     later = FIRST | {
         "threads": 2,
         "argv": ["my own"],

@@ -37,7 +37,8 @@ def runs_at(place: Path, histories: bool = False) -> list[PlacedRun]:
         return _of_study(StudyDirectory(place), histories)
     name, number = place.parent.name, place.name.removeprefix(PREFIX)
     study = StudyDirectory(place.parent.parent)
-    if not (number.isdecimal() and place.name == f"{PREFIX}{number}"):
+    # as a person would write it: not seed-01
+    if not number.isdecimal() or place.name != f"{PREFIX}{int(number)}":
         return []
     if not _has_tables(study):
         return []

@@ -13,6 +13,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel, ValidationError
+
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.yaml_and_json import read_json
@@ -99,16 +101,28 @@ def read_provenances(path: Path) -> dict[str, dict[str, Any]]:
     """
     if not files.is_file(path):
         return {}
-    listed = read_json(path).get("provenances")
-    if not isinstance(listed, list):
-        raise UserError(f"'{path}' is damaged: expected a list of provenances")
-    found: dict[str, dict[str, Any]] = {}
-    for entry in listed:
-        if not isinstance(entry, dict) or not isinstance(entry.get("id"), str):
-            raise UserError(f"'{path}' is damaged: expected objects with an id")
+    fields = read_json(path)
+    try:
+        _Provenances.model_validate(fields)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise UserError(f"'{path}' is damaged: {where}: {first['msg']}") from None
+    for entry in fields["provenances"]:
         check_provenance(entry, path)
-        for key in (COMMANDS, THREADS):
-            if not isinstance(entry.get(key), list):
-                raise UserError(f"'{path}' is damaged: expected a list of {key}")
-        found[entry["id"]] = entry
-    return found
+    return {entry["id"]: entry for entry in fields["provenances"]}
+
+
+class _Entry(BaseModel, frozen=True, strict=True):
+    """What an entry says besides what is in the provenance of a run."""
+
+    id: str
+    runs: int
+    commands: list[str]
+    threads: list[int]
+
+
+class _Provenances(BaseModel, frozen=True, strict=True):
+    """What provenance.json of a study says."""
+
+    provenances: list[_Entry]

@@ -33,6 +33,7 @@ def write_table(path: Path, table: pa.Table) -> None:
         "use_dictionary": [name for name in others if name not in LISTS],
         "use_byte_stream_split": floats,
         "write_statistics": False,
+        "write_page_checksum": True,
         "row_group_size": max(1, table.num_rows),
     }
     sink = pa.BufferOutputStream()
@@ -61,7 +62,7 @@ def read_table(path: Path, names: Collection[str] = (), some: bool = False) -> p
     """
     content = pa.BufferReader(files.read_bytes(path, MOST))
     try:
-        file = pq.ParquetFile(content)
+        file = pq.ParquetFile(content, page_checksum_verification=True)
         missing = [name for name in names if name not in file.schema_arrow.names]
         if missing:
             raise ValueError(f"it has no column {missing[0]}")

@@ -120,11 +120,14 @@ class Tables:
             try:
                 if histories and run not in read:
                     raise UserError(f"'{self.history}' does not have it")
+                origin = row.get(("provenance",), "")
+                if origin not in provenances:
+                    raise UserError(f"'{self.provenance}' has no id '{origin}'")
                 found[run] = run_of_row(
                     row,
                     self.study,
                     config.with_seed(name, seed),
-                    provenances.get(row.get(("provenance",), ""), {}),
+                    provenances[origin],
                     read.get(run, {}),
                     seconds.get(run, 0.0),
                 )
