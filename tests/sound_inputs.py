@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -87,4 +88,8 @@ def write_sound_inputs() -> None:
     done = json.loads(provenance.read_text()) | {"finished": "2026-01-01T00:00:00"}
     provenance.write_text(json.dumps(done))
     shutil.copytree("finished", "packed")
-    assert pack(StudyDirectory(Path("packed"))).packed == 1
+    packed = StudyDirectory(Path("packed"))
+    scores = SCORES | {"held_out": {"epuck": TEST, "epuck_kinematic": TEST}}
+    tested = replace(champion, task=config.task, scores=scores)
+    packed.run("mine", 1).champion.write_text(tested.to_json())
+    assert pack(packed).packed == 1
