@@ -52,7 +52,7 @@ def provenance(
         "versions": {
             "python": platform.python_version(),
             **_versions(),
-            "blas": _blas(),
+            "blas": blas(),
         },
         "git": _git(),
         "mjcf_sha256": dict(scene.sha256),
@@ -71,7 +71,7 @@ def _versions() -> Mapping[str, str]:
 
 
 @cache
-def _blas() -> str:
+def blas() -> str:
     """Name and version of numpy's linear algebra, on which CMA-ES depends."""
     blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
     return f"{blas['name']} {blas['version']}"

@@ -17,7 +17,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import check_threads, main, parse, word
 from epuck_mj.policies.file import CHAMPION, CHAMPIONS
 from evolution.run.directory import RunDirectory
-from evolution.run.provenance import processor
+from evolution.run.provenance import blas, processor
 from evolution.study.addresses import PlacedRun, runs_at
 from evolution.verify.written import Written, read_run
 
@@ -137,6 +137,8 @@ def changes(provenance: Mapping[str, Any]) -> list[str]:
 def _version(package: str) -> str:
     if package == "python":
         return platform.python_version()
+    if package == "blas":
+        return blas()
     try:
         return version(package)
     except PackageNotFoundError:
