@@ -37,10 +37,10 @@ from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.motors import STEP_ANGLE
 from epuck_mj.trials.trajectory import Trajectory
 from tests.processes import PATIENCE, python_process
+from tests.shipped import champion_file
 from tests.test_fake import fake_process, living, wait_for
 
-ROOT = Path(__file__).resolve().parent.parent
-CHAMPION = ROOT / "results" / "paper" / "de-best" / "seed-1" / "champion.json"
+CHAMPION = champion_file()
 AT_WALL = (0.44, 0.0, np.pi / 2)
 
 
