@@ -328,7 +328,8 @@ def test_pandas_reads_the_tables(study):
         for seed in seeds:
             run = study.tables.runs(study.stored_config())[name, seed]
             here = found.champions.experiment.eq(name) & found.champions.seed.eq(seed)
-            (row,) = found.champions[here].to_dict(orient="records")
+            assert here.sum() == 1
+            row = found.champions[here].iloc[0]
             assert row["epuck_mean"] == run.scores.held_out["epuck"].mean
             assert row["stored"] == run.scores.stored
             assert list(row["genome"]) == run.champion.genome.tolist()
