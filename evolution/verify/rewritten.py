@@ -210,11 +210,25 @@ def stored_without_checkpoint(written: Written, evolution: Evolution) -> Stored:
 
 
 def _earned(evolution: Evolution, genome: np.ndarray, generations: range) -> np.ndarray:
-    """What a genome earns on the trials of each generation, `(generations,)`."""
+    """What a genome earns on the trials of each generation, `(n,)`.
+
+    Where individuals have starts of their own, on those of each of them: which one it
+    was is not stored.
+    """
     engine, topology = evolution.engine, evolution.config.topology
+    # offspring, and parents that are evaluated again
+    most = 2 * len(evolution.optimizer.population)
+    individuals = most if evolution.config.own_starts else 1
+    genomes = np.repeat(genome[None], individuals, axis=0)
     each = [
-        evaluate(engine, topology, genome[None], starts, disturbances=met).fitness
-        for starts, met in map(evolution.trials, generations)
+        evaluate(
+            engine,
+            topology,
+            genomes,
+            evolution.starts(generation, individuals),
+            disturbances=evolution.disturbances(generation),
+        ).fitness
+        for generation in generations
     ]
     return np.concatenate(each)
 
