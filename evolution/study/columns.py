@@ -34,6 +34,7 @@ FIRST: tuple[Place, ...] = (
     ("genome",),
     ("most_believed", "stored"),
     ("most_believed", "held_out"),
+    ("most_believed", "robot"),
     ("most_believed", "genome"),
     ("tested_on",),
 )
@@ -113,7 +114,7 @@ def score_fields(row: Row) -> dict[str, Any]:
     fields[TESTS] = tests[TESTS]
     believed = {
         key: row["most_believed", key]
-        for key in ("stored", "held_out")
+        for key in ("stored", "held_out", "robot")
         if ("most_believed", key) in row
     }
     if believed:
