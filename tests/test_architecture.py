@@ -32,9 +32,10 @@ ROOMS = {
         {"judging"},
         {"run"},
         {"study"},
-        {"named_policies", "pages"},
+        {"margins", "named_policies", "pages"},
         {"evaluate", "export", "frames", "gap", "replay", "report", "verify"},
         {"reproduce"},
+        {"variations"},
         {"__main__"},
     ],
 }
@@ -76,9 +77,11 @@ ALLOWED_IN = {
         "evolution/pages/figure_files.py",
         "evolution/pages/style.py",
         "evolution/report/figures/",
+        "evolution/variations/variations_figure.py",
     ),
     "pandas": ("evolution/frames.py",),
     "pyarrow": (
+        "evolution/margins/margins_table.py",
         "evolution/study/columns.py",
         "evolution/study/histories.py",
         "evolution/study/table_files.py",

@@ -22,7 +22,6 @@ from evolution.margins.changed_robots import (
     with_body_radius,
     with_sensors_set_back,
 )
-from evolution.margins.margins_figure import margins_figure
 from evolution.margins.margins_table import (
     FILE,
     Margins,
@@ -31,6 +30,7 @@ from evolution.margins.margins_table import (
     write_margins,
 )
 from evolution.margins.measuring import Margin, margins_of_genomes, margins_of_policy
+from evolution.report.figures.margins import margins_figure
 from evolution.settings.setting import Setting
 
 ROBOT = "epuck_kinematic"
@@ -183,7 +183,7 @@ def test_a_table_reads_back_exactly(tmp_path):
 def test_what_is_no_table_is_refused(tmp_path):
     assert read_margins(tmp_path / FILE) is None
     (tmp_path / FILE).write_text("experiment,seed\n")
-    with pytest.raises(UserError, match=r"margins.parquet' is no table of margins: "):
+    with pytest.raises(UserError, match=r"cannot read '.*margins.parquet': "):
         read_margins(tmp_path / FILE)
 
 

@@ -142,7 +142,7 @@ CHAMPION = {
         setting("scene", "mjcf_sha256", "arena", to="0"),
         "mjcf_sha256: arena '0'",
     ),
-    "gene": (setting("genome", 3, to=0.5), "genome: 3 0.5 is now "),
+    "gene": (setting("genome", 3, to=0.5), "3 0.5 is now "),
     "believed": (
         setting("scores", "most_believed", "held_out", to=1.0),
         "scores.most_believed: held_out 1.0 is now ",

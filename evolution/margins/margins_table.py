@@ -1,17 +1,15 @@
 """The table of margins: a row per champion, change and amount, in a Parquet file."""
 
-import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
-from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from evolution.margins.measuring import Margin
+from evolution.study.table_files import read_table, write_table
 
 FILE = "margins.parquet"
 """Name of the table in a study's directory."""
@@ -84,10 +82,8 @@ def write_margins(path: Path, parts: Sequence[pa.Table]) -> None:
     Raises:
         UserError: if it cannot be written.
     """
-    content = io.BytesIO()
-    pq.write_table(pa.concat_tables(parts), content, compression="zstd")
     with files.writing():
-        files.write_bytes(path, content.getvalue())
+        write_table(path, pa.concat_tables(parts))
 
 
 def read_margins(path: Path) -> Margins | None:
@@ -98,10 +94,6 @@ def read_margins(path: Path) -> Margins | None:
     """
     if not files.is_file(path):
         return None
-    try:
-        table = pq.read_table(path, schema=SCHEMA)
-    except (pa.ArrowException, OSError) as error:
-        reason = str(error).splitlines()[0]
-        raise UserError(f"'{path}' is no table of margins: {reason}") from None
+    table = read_table(path, SCHEMA.names)
     columns = {name: np.array(table[name].to_pylist()) for name in SCHEMA.names}
     return Margins(**columns)
