@@ -312,7 +312,7 @@ class World:
 
 
 def changed_robot(folder, radii, track):
-    """The planar robot with other wheels, in its arena."""
+    """The kinematic robot with other wheels, in its arena."""
     text = (MODELS / "epuck_planar.xml").read_text()
     for side, radius in zip((-1, 1), radii, strict=True):
         gear = f"{1 / WHEEL_RADIUS:.7f} 0 0 0 0 {side * TRACK / 2 / WHEEL_RADIUS:.7f}"
@@ -377,8 +377,8 @@ def test_a_robot_on_wheels(output):
     np.testing.assert_allclose(found.gains, GAINS, rtol=0.03)
 
 
-def test_a_weak_sensor_is_no_reason_to_stop(planar, output, capsys):
-    world = World(planar)
+def test_a_weak_sensor_is_no_reason_to_stop(kinematic, output, capsys):
+    world = World(kinematic)
     moved = iter([0.02, 0.02, 0.02])
     world.person.changes = {
         "mm of air": [lambda: world.person.at_wall(next(moved))] * 3
@@ -387,10 +387,10 @@ def test_a_weak_sensor_is_no_reason_to_stop(planar, output, capsys):
     assert capsys.readouterr().out.count("warning: ps") == N_PROXIMITY
 
 
-def test_one_step_keeps_what_the_others_found(planar, output):
+def test_one_step_keeps_what_the_others_found(kinematic, output):
     before = Calibration(tuple(GAINS.tolist()), (0.0203, 0.0203), 0.0555)
     before.save(output)
-    assert World(planar).calibrate(output, "turn") == 0
+    assert World(kinematic).calibrate(output, "turn") == 0
     found = Calibration.load(output)
     assert found.track == pytest.approx(TRACK * 0.0203 / WHEEL_RADIUS, rel=0.002)
     assert dataclasses.replace(found, track=0.0555) == before
@@ -399,8 +399,8 @@ def test_one_step_keeps_what_the_others_found(planar, output):
 # answers
 
 
-def test_bad_answers_are_asked_again(planar, output, capsys):
-    world = World(planar)
+def test_bad_answers_are_asked_again(kinematic, output, capsys):
+    world = World(kinematic)
     # a comma is as good as a point
     answers = ["", "half a metre", "51.5", "nan", "-0.5", "0,515"]
     world.person.changes = {"metres": [lambda: answers.pop(0)] * len(answers)}
@@ -424,10 +424,10 @@ def test_bad_answers_are_asked_again(planar, output, capsys):
         (("sensors",), "[y/n]", "n", "got 60 of ps0: the zero is not set"),
     ],
 )
-def test_what_no_robot_has_is_refused(planar, output, steps, part, answer, message):
+def test_what_no_robot_has_is_refused(kinematic, output, steps, part, answer, message):
     Calibration(track=0.055, wheel_radii=(0.0204, 0.0203)).save(output)
     before = output.read_bytes()
-    world = World(planar)
+    world = World(kinematic)
     world.body.offset = 60
     world.person.changes = {part: [lambda: answer]}
     with pytest.raises(UserError, match=message) as caught:
@@ -450,8 +450,8 @@ def end_of_input():
         (("turn", "sensors"), "mm of air"),
     ],
 )
-def test_the_end_of_the_input(planar, output, steps, part):
-    world = World(planar)
+def test_the_end_of_the_input(kinematic, output, steps, part):
+    world = World(kinematic)
     world.person.changes = {part: [end_of_input]}
     with pytest.raises(UserError, match="got the end of the input") as caught:
         world.calibrate(output, *steps)
@@ -474,8 +474,8 @@ def test_the_end_of_the_input(planar, output, steps, part):
         ("gone@4", 4, "THE MOTORS MAY STILL TURN, switch the robot off"),
     ],
 )
-def test_faults(planar, output, capsys, step, faults, status, message):
-    world = World(planar, faults=faults)
+def test_faults(kinematic, output, capsys, step, faults, status, message):
+    world = World(kinematic, faults=faults)
     world.person.changes = {"[y/n]": [lambda: "n"]}
     assert world.calibrate(output, step) == status
     error = capsys.readouterr().err
@@ -485,16 +485,16 @@ def test_faults(planar, output, capsys, step, faults, status, message):
     assert not output.exists()
 
 
-def test_a_robot_that_stalls_its_motors(planar, output, capsys, monkeypatch):
-    world = World(planar)
+def test_a_robot_that_stalls_its_motors(kinematic, output, capsys, monkeypatch):
+    world = World(kinematic)
     monkeypatch.setattr(world.body, "steps", lambda: (0, 0))
     assert world.calibrate(output, "straight") == 3
     assert "expected 4000 steps in 32 s; came 0" in capsys.readouterr().err
     assert world.body.standing
 
 
-def test_a_signal_while_it_drives(planar, output, capsys, handlers, monkeypatch):
-    world = World(planar)
+def test_a_signal_while_it_drives(kinematic, output, capsys, handlers, monkeypatch):
+    world = World(kinematic)
     sleep = world.time.sleep
 
     def interrupted(duration):
@@ -509,8 +509,8 @@ def test_a_signal_while_it_drives(planar, output, capsys, handlers, monkeypatch)
     assert not output.exists()
 
 
-def test_a_signal_at_a_question(planar, output, handlers):
-    world = World(planar)
+def test_a_signal_at_a_question(kinematic, output, handlers):
+    world = World(kinematic)
     world.person.changes = {"before": [lambda: signal.raise_signal(signal.SIGTERM)]}
     assert world.calibrate(output) == 128 + signal.SIGTERM
 
@@ -614,10 +614,10 @@ def test_the_whole_command(tmp_path, output):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
-def test_signals(planar, tmp_path, output, signum):
+def test_signals(kinematic, tmp_path, output, signum):
     port = Pty(tmp_path / "e-puck")
     with (
-        living(port, planar) as emulator,
+        living(port, kinematic) as emulator,
         started(port.name, output) as process,
     ):
         assert process.stdin is not None
@@ -634,12 +634,12 @@ def test_signals(planar, tmp_path, output, signum):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGHUP])
-def test_signals_at_a_terminals_question(planar, tmp_path, output, signum):
+def test_signals_at_a_terminals_question(kinematic, tmp_path, output, signum):
     master, slave = pty.openpty()
     port = Pty(tmp_path / "e-puck")
     try:
         with (
-            living(port, planar),
+            living(port, kinematic),
             started(port.name, output, stdin=slave) as process,
         ):
             assert process.stdout is not None
@@ -656,10 +656,10 @@ def test_signals_at_a_terminals_question(planar, tmp_path, output, signum):
 
 
 @pytest.mark.slow
-def test_nobody_answers(planar, tmp_path, output):
+def test_nobody_answers(kinematic, tmp_path, output):
     port = Pty(tmp_path / "e-puck")
     with (
-        living(port, planar),
+        living(port, kinematic),
         started(port.name, output) as process,
     ):
         _, error = process.communicate("", timeout=PATIENCE)
@@ -685,13 +685,13 @@ def test_without_a_robot_nobody_is_asked_anything(output):
 # what the file is for
 
 
-def test_a_calibrated_robot_in_simulation(tmp_path, planar):
+def test_a_calibrated_robot_in_simulation(tmp_path, kinematic):
     """It drives as the robot does whose wheels these really are."""
     calibration = Calibration(tuple(GAINS), RADII, 0.0562)
     quiet = Noise(counts=0.0, wheels=0.0, age=0.0)
     rng = np.random.default_rng(0)
     disturbances = draw_calibrated(calibration, rng, 2, 20, quiet)
-    robots = DisturbedRobots(MujocoRobots(planar, 2, 1), disturbances, 0.1)
+    robots = DisturbedRobots(MujocoRobots(kinematic, 2, 1), disturbances, 0.1)
     other = MujocoRobots(changed_robot(tmp_path, RADII, 0.0562), 2, 1)
     starts = np.array([[0.3, 0.0, 1.0], [0.44, 0.1, 1.5]])
     reading, truth = robots.reset(starts), other.reset(starts)

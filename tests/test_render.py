@@ -96,7 +96,7 @@ def test_an_arena_without_light_and_sky_is_on_white(tmp_path):
     )
     arena = tmp_path / "bare.xml"
     arena.write_text(f"<mujoco><worldbody>{walls}</worldbody></mujoco>")
-    scene = load_scene("epuck_planar", str(arena), TASK.control_step)
+    scene = load_scene("epuck", str(arena), TASK.control_step)
     trajectory = record(scene, ahead, np.zeros(3), TASK)
     with painter(scene, [trajectory], *SIZE) as artist:
         picture = artist.picture()

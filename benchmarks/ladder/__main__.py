@@ -40,7 +40,6 @@ COLUMNS: Mapping[str, Callable[[str], Scene]] = {
     "epuck": lambda arena: load_scene("epuck", arena),
     "epuck, touches at the end": _end_of_step,
     "epuck_kinematic": lambda arena: load_scene("epuck_kinematic", arena),
-    "epuck_planar": lambda arena: load_scene("epuck_planar", arena),
 }
 """What is compared, and how its scene is made."""
 
