@@ -382,7 +382,7 @@ def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
         # a leaning cylinder has no exact outline
         ("epuck", LEANING_WALL, ["epuck"]),
         ("epuck_kinematic", ROUND_WALL, ["epuck", "epuck_kinematic"]),
-        ("own.xml", ROUND_WALL, ["own", "epuck"]),
+        ("own.xml", ROUND_WALL, ["own.xml", "epuck"]),
     ],
 )
 def test_a_run_is_tested_on_wheels_and_on_one_robot_more_that_can_be(

@@ -41,7 +41,8 @@ def find_robot(name: str) -> Path:
             "shipped robot that is simulated without MuJoCo"
         )
     # one robot, simulated in two ways
-    by_name = dict.fromkeys((KINEMATIC_ROBOT, WHEELED_ROBOT), MODELS / ROBOT_FILE)
+    shipped = MODELS / ROBOT_FILE
+    by_name = {KINEMATIC_ROBOT: shipped, WHEELED_ROBOT: shipped}
     return find(name, "robot", by_name, "an MJCF").resolve()
 
 
