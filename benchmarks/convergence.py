@@ -206,8 +206,8 @@ Made by `python -m benchmarks.convergence`. Mean fitness of 300 on wheels over {
 starts of the hand-written wall follower, of champions of results/paper, and of a
 fragile controller, evolved with a softer drive, that rides 0.4 mm off the wall. The
 reference is the shipped configuration at a fifth of its step. Deviation: the largest of
-any controller; up to {margin:.1%} passes, half of what the tests allow. Cost: CPU time of a
-control step, the shipped one's is 1; differences of a few per cent are noise."""
+any controller; up to {margin:.1%} passes, half of what the tests allow. Cost: CPU time
+of a control step, the shipped one's is 1; differences of a few per cent are noise."""
 
 if __name__ == "__main__":
     main(tyro.cli(Options))
