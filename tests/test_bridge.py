@@ -40,7 +40,7 @@ from tests.processes import PATIENCE, python_process
 from tests.test_fake import fake_process, living, wait_for
 
 ROOT = Path(__file__).resolve().parent.parent
-CHAMPION = ROOT / "results" / "paper" / "de-best" / "seed-1" / "champion.json"
+CHAMPION = ROOT / "benchmarks" / "controllers" / "fragile.json"
 AT_WALL = (0.44, 0.0, np.pi / 2)
 
 

@@ -117,8 +117,8 @@ def test_a_body_turns_on_the_spot(kinematic):
     assert yaw[-1] == pytest.approx(expected, rel=0.03)
 
 
-def test_a_robot_at_a_wall_pushes_and_goes_on_counting(kinematic):
-    body = SimulatedBody(kinematic, np.array([0.42, 0.0, 0.0]), 0.0)
+def test_a_robot_at_a_wall_pushes_and_goes_on_counting(wheels):
+    body = SimulatedBody(wheels, np.array([0.42, 0.0, 0.0]), 0.0)
     emulator = Emulator(body, "asercom", 0.0)
     emulator.exchange(b"D,1000,1000\r", 0.0)
     for k in range(600):

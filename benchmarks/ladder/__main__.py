@@ -95,7 +95,10 @@ def ladder(argv: Sequence[str]) -> int:
                     ]
                     _save(options.json, found)
             print(f"{arena}: {name}", file=sys.stderr, flush=True)
-    in_arenas = {arena: found[arena] for arena in ARENAS}
+    # a file may have figures of robots that are gone
+    in_arenas = {
+        arena: {name: found[arena][name] for name in COLUMNS} for arena in ARENAS
+    }
     write_page(options.page, in_arenas, controllers, options.starts)
     return 0
 
