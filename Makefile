@@ -49,7 +49,7 @@ bridge: $(INSTALLED)
 # champions of three seeds of each experiment in other worlds, kinematic and on wheels
 gap: $(INSTALLED)
 	$(BIN)/python -m evolution.gap \
-	  $(wildcard $(PAPERS:%=results/paper/%/seed-[123])) \
+	  $(foreach seed,1 2 3,$(PAPERS:%=results/paper/%/seed-$(seed))) \
 	  results/transfer wall-follower --output results/gap
 
 # what git keeps of the studies in runs/, and everything that is made of it
@@ -57,10 +57,10 @@ results: $(INSTALLED)
 	$(BIN)/python -m evolution.reproduce.publish
 
 # all pictures; the first needs EGL or OSMesa, the second a Vulkan driver
-figures: $(INSTALLED)
+figures: $(INSTALLED) run
 	$(BIN)/python -m evolution.replay $(CHAMPION) --starts test:0 \
 	  --image docs/champion.png
-	$(BIN)/python -m evolution.replay $(CHAMPION) --generations 0,10,50,last \
+	$(BIN)/python -m evolution.replay $(RUN) --generations 0,10,50,last \
 	  --starts test:0 --save runs/generations.rrd
 	$(BIN)/python -m evolution.replay.viewer_picture runs/generations.rrd \
 	  --output docs/replay.png --size 1400 875

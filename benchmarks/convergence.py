@@ -31,6 +31,7 @@ from epuck_mj.step.control import (
     TaskParameters,
     run_trials,
 )
+from evolution.study.addresses import champion_at
 
 HERE = Path(__file__).resolve().parent
 CHAMPIONS = HERE.parent / "results" / "paper" / "de-best"
@@ -102,8 +103,8 @@ def configurations(shipped: float) -> list[Configuration]:
 
 def controllers(n: int) -> dict[str, BatchPolicy]:
     """The fixed set, each as a policy for `n` robots."""
-    files = [CHAMPIONS / f"seed-{seed}" / "champion.json" for seed in SEEDS]
-    evolved = {f"de-best-{path.parent.name}": load_controller(path) for path in files}
+    places = [CHAMPIONS / f"seed-{seed}" for seed in SEEDS]
+    evolved = {f"de-best-{place.name}": champion_at(place) for place in places}
     evolved["fragile"] = load_controller(FRAGILE)
     policies: dict[str, BatchPolicy] = {"by hand": WallFollower()}
     for name, file in evolved.items():

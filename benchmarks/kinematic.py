@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.convergence import CHAMPIONS
-from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.network import Controller, Network
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
@@ -25,6 +24,7 @@ from epuck_mj.step.control import TaskParameters
 from evolution.judging.evaluation import BatchEngine, Work
 from evolution.judging.held_out_starts import held_out_disturbances
 from evolution.settings.randomness import Purpose
+from evolution.study.addresses import champion_at
 
 CHAMPION = CHAMPIONS / "seed-1"
 """It drives along walls nearly all the time."""
@@ -119,7 +119,7 @@ def rooms(folder: Path, n: int) -> Path:
 
 def _works(scene: Scene, n: int) -> Callable[[Conditions | None], Work]:
     """Maker of trials of a champion from `n` starts, under conditions."""
-    file = load_controller(CHAMPION)
+    file = champion_at(CHAMPION)
     starts = FreeSpace(scene, 0.1).sample(np.random.default_rng(0), n)
     controller = file.network.decode(np.tile(file.genome, (n, 1)))
 

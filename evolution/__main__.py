@@ -18,6 +18,7 @@ COMMANDS = {
     "evolution.margins": "test champions on robots that differ in one number",
     "evolution.variations": "write a page about variations of the algorithms",
     "evolution.gap": "test champions in a hundred other worlds",
+    "evolution.export": "write the controller file of a run in a study's tables",
     "evolution.reproduce": "repeat the paper's comparison in one command",
     "evolution.verify": "test shipped champions again and compare the scores",
 }

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.policies.file import load_controller
+from epuck_mj.policies.file import ControllerFile, load_controller
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
 from epuck_mj.scene.model_files import KINEMATIC_ROBOT
 from epuck_mj.step.conditions import Conditions
@@ -22,7 +22,7 @@ from evolution.run.directory import RunDirectory
 from evolution.run.history import read_best_individuals
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import load_config
-from evolution.study.directory import champions
+from evolution.study.addresses import PlacedRun, runs_at
 
 LAST = "last"
 """Word for the latest generation."""
@@ -69,7 +69,8 @@ def named_policies(path: str, generations: str | None = None) -> list[NamedPolic
     """The policies at a path, at least one.
 
     Args:
-        path: a run or study directory, a controller file, or `wall-follower`.
+        path: a run or study directory, `STUDY/EXPERIMENT/seed-N`, a controller file, or
+            `wall-follower`.
         generations: instead of champions, the best individuals of these generations of
             a run: numbers from 0 on and `last`, with commas in between.
 
@@ -77,7 +78,7 @@ def named_policies(path: str, generations: str | None = None) -> list[NamedPolic
         UserError: if there are none.
     """
     if generations is not None:
-        return _best_individuals(RunDirectory(Path(path)), generations)
+        return _best_individuals(Path(path), generations)
     if path == YARDSTICK:
         return [NamedPolicy(YARDSTICK, WallFollower(), TaskParameters())]
     place = Path(path)
@@ -85,20 +86,25 @@ def named_policies(path: str, generations: str | None = None) -> list[NamedPolic
         run = RunDirectory(place.parent)
         beside = place == run.champion and files.is_file(run.config)
         return [_champion(place, path, run.stored_config() if beside else None)]
-    runs = [RunDirectory(champion.parent) for champion in champions(place)]
-    if not runs:
+    found = [policy for run in runs_at(place) for policy in _of_run(run)]
+    if not found:
         raise UserError(
             f"no champion in '{path}': expected the directory of a finished run, "
-            f"or of a study with one, a controller file, or {YARDSTICK}"
+            f"or of a study with one, STUDY/EXPERIMENT/seed-N, a controller file, or "
+            f"{YARDSTICK}"
         )
-    return [
-        _champion(
-            run.champion,
-            str(run.path),
-            load_config(run.config) if files.is_file(run.config) else None,
-        )
-        for run in runs
-    ]
+    return found
+
+
+def _of_run(run: PlacedRun) -> list[NamedPolicy]:
+    """The champion of a run, if there is one."""
+    if not isinstance(run, RunDirectory):
+        scores = KnownScores.read(run.champion.scores, run.path)
+        return [_policy(run.champion, str(run.path), scores, run.config)]
+    if not files.is_file(run.champion):
+        return []
+    config = load_config(run.config) if files.is_file(run.config) else None
+    return [_champion(run.champion, str(run.path), config)]
 
 
 def policies_of(
@@ -119,6 +125,15 @@ def policies_of(
 
 def _champion(path: Path, name: str, config: ExperimentConfig | None) -> NamedPolicy:
     file = load_controller(path)
+    return _policy(file, name, KnownScores.read(file.scores, path), config)
+
+
+def _policy(
+    file: ControllerFile,
+    name: str,
+    scores: KnownScores,
+    config: ExperimentConfig | None,
+) -> NamedPolicy:
     clearance = file.origin.start_clearance
     if clearance is None:
         clearance = config.start_clearance if config else START_CLEARANCE
@@ -129,13 +144,24 @@ def _champion(path: Path, name: str, config: ExperimentConfig | None) -> NamedPo
         file.origin.robot,
         file.origin.arena,
         clearance,
-        KnownScores.read(file.scores, path),
+        scores,
         config,
     )
 
 
-def _best_individuals(run: RunDirectory, generations: str) -> list[NamedPolicy]:
-    """The best individuals of some generations of a run, which need not be finished."""
+def _best_individuals(path: Path, generations: str) -> list[NamedPolicy]:
+    """The best individuals of some generations of a run, which need not be finished.
+
+    Raises:
+        UserError: if there are none, or they are in no file.
+    """
+    run = RunDirectory(path)
+    if not files.is_directory(path) and runs_at(path):
+        raise UserError(
+            f"'{path}' is a row of a table, without the best individuals of its "
+            f"generations; to do the run again: python -m evolution.export {path} "
+            "config.yaml, then python -m evolution.run config.yaml"
+        )
     for file in (run.config, run.best_individuals):
         if not files.is_file(file):
             raise UserError(

@@ -204,6 +204,19 @@ def npz_fault(content: bytes, rng: random.Random) -> Fault:
     return kinds[kind], f"{kind} {name}"
 
 
+def parquet_fault(content: bytes, rng: random.Random) -> Fault:
+    """A table that is cut, something else, or has a bit turned in its first values."""
+    kind = rng.choice(["emptied", "cut", "text", "a bit"])
+    if kind == "cut":
+        n = rng.randrange(len(content))
+        return content[:n], f"{n} of {len(content)} bytes"
+    if kind == "a bit":
+        # of the texts of the first column, behind the header of its page
+        i = content.index(b"mine") + rng.randrange(4)
+        return content[:i] + bytes([content[i] ^ 1]) + content[i + 1 :], f"bit of {i}"
+    return (b"" if kind == "emptied" else b"PAR1 of old\n"), kind
+
+
 def archive(members: dict[str, bytes]) -> bytes:
     """The bytes of a zip archive."""
     buffer = io.BytesIO()

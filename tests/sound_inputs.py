@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +17,16 @@ from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 from evolution.study.config import StudyConfig
 from evolution.study.directory import StudyDirectory
+from evolution.study.packing import pack
 
-BEGUN = "begun/mine/seed-1"
+BEGUN = "begun/running/mine/seed-1"
 """A run that has evolved and is to be resumed; its champion is made up."""
 
-FINISHED = "finished/mine/seed-1"
+FINISHED = "finished/running/mine/seed-1"
 """The same run, marked as finished."""
+
+PACKED = "packed/mine/seed-1"
+"""Address of the same run in the tables of a study."""
 
 KEYS = {
     "seed": 1,
@@ -82,3 +87,9 @@ def write_sound_inputs() -> None:
     provenance = Path(FINISHED, "provenance.json")
     done = json.loads(provenance.read_text()) | {"finished": "2026-01-01T00:00:00"}
     provenance.write_text(json.dumps(done))
+    shutil.copytree("finished", "packed")
+    packed = StudyDirectory(Path("packed"))
+    scores = SCORES | {"held_out": {"epuck": TEST, "epuck_kinematic": TEST}}
+    tested = replace(champion, task=config.task, scores=scores)
+    packed.run("mine", 1).champion.write_text(tested.to_json())
+    assert pack(packed).packed == 1

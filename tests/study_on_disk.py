@@ -13,6 +13,7 @@ from epuck_mj.step.control import TaskParameters
 from evolution.settings.config_files import find_config, load_config
 from evolution.study.config import StudyConfig
 from evolution.study.directory import StudyDirectory
+from evolution.study.packing import pack
 
 ROBOTS = ("epuck", "epuck_kinematic")
 LEVELS = {"de-best": 220.0, "de-rand": 180.0, "ga": 120.0}
@@ -56,9 +57,15 @@ def history(name: str, seed: int) -> np.ndarray:
 
 
 def write_study(
-    path: Path, seeds: Mapping[str, list[int]], yardstick: bool = True
+    path: Path,
+    seeds: Mapping[str, list[int]],
+    yardstick: bool = True,
+    packed: bool = True,
 ) -> Path:
-    """A study of experiments, each with finished runs of those seeds."""
+    """A study of experiments, each with finished runs of those seeds.
+
+    They are in the tables, or in their directories as if the study had been killed.
+    """
     configs = {
         name: load_config(find_config(name)).model_copy(
             update={"evaluations": EVALUATIONS}
@@ -77,6 +84,10 @@ def write_study(
     for name, each in seeds.items():
         for seed in each:
             _write_run(directory, config, name, seed)
+    if packed:
+        packing = pack(directory)
+        assert packing.packed == sum(map(len, seeds.values()))
+        assert not (packing.left or packing.notes)
     return path
 
 

@@ -21,6 +21,7 @@ from epuck_mj.check.__main__ import check
 from epuck_mj.host.command_line import main
 from epuck_mj.view.__main__ import view
 from evolution.evaluate import evaluate_policies
+from evolution.export import export
 from evolution.gap.__main__ import measure_gap
 from evolution.replay.__main__ import replay
 from evolution.report.__main__ import report_study
@@ -29,7 +30,7 @@ from evolution.run.__main__ import evolve
 from evolution.study.__main__ import study
 from evolution.verify.__main__ import verify
 from tests import faults
-from tests.sound_inputs import BEGUN, FINISHED, write_sound_inputs
+from tests.sound_inputs import BEGUN, FINISHED, PACKED, write_sound_inputs
 
 N = int(os.environ.get("BAD_INPUTS", "200"))
 FIRST = int(os.environ.get("BAD_INPUTS_FROM", "0"))
@@ -46,6 +47,7 @@ COMMANDS = {
     "gap": measure_gap,
     "reproduce": reproduce_paper,
     "verify": verify,
+    "export": export,
     "check": check,
     "view": view,
     "bridge": bridge,
@@ -109,6 +111,25 @@ READERS = {
     f"{FINISHED}/config.yaml": ["report finished --output out"],
     f"{FINISHED}/provenance.json": ["report finished --output out"],
     f"{FINISHED}/history.csv": ["report finished --output out"],
+    "packed/champions.parquet": [
+        "report packed --output out",
+        f"evaluate {PACKED}",
+        f"{SHOW} packed",
+        f"gap {PACKED} --output out",
+        f"verify {PACKED}",
+        f"export {PACKED} out.json",
+        "study study.yaml --output packed --seeds 1",
+    ],
+    "packed/history.parquet": [
+        "report packed --output out",
+        f"verify {PACKED}",
+    ],
+    "packed/provenance.json": [
+        "report packed --output out",
+        f"evaluate {PACKED}",
+        f"export {PACKED} out.yaml",
+    ],
+    "packed/study.yaml": [f"evaluate {PACKED}", f"export {PACKED} out.json"],
     "finished/study.yaml": [
         "report finished --output out",
         "study study.yaml --output finished --seeds 1",
@@ -204,8 +225,8 @@ def bad_file(rng: random.Random) -> tuple[str, str]:
     name = rng.choice(list(READERS))
     path, line = Path(name), rng.choice(READERS[name])
     content, form = path.read_bytes(), path.suffix[1:]
-    if form == "npz":
-        content, what = faults.npz_fault(content, rng)
+    if form in ("npz", "parquet"):
+        content, what = getattr(faults, f"{form}_fault")(content, rng)
     else:
         text = content.decode()
         chance = rng.random()

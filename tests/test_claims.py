@@ -504,3 +504,11 @@ def test_the_page_says_what_is_settled_and_what_is_not():
     )
     assert "earns more, or both the same" not in open_
     assert "undecided by these runs" in open_
+
+
+def test_fewer_runs_than_planned_are_provisional():
+    few, all_ = (
+        reproduction(study(LIKE_THE_PAPER, n=n), None, [], "command") for n in (12, 100)
+    )
+    assert "Provisional: there are 12 of the 100 runs" in few
+    assert "Provisional" not in all_

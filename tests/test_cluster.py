@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import signal
 import socket
 import subprocess
@@ -16,16 +17,21 @@ from types import SimpleNamespace
 from typing import Any
 
 import dask.config
+import numpy as np
 import pytest
 import yaml
 from distributed import Client
 
 from epuck_mj.errors import UserError
+from evolution.run.directory import RunDirectory
 from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from evolution.study.__main__ import study
+from evolution.study.addresses import run_at
 from evolution.study.cluster import carry_out_on_cluster, connection, requirements
+from evolution.study.directory import StudyDirectory
+from evolution.study.histories import history_of
 from evolution.study.jobs import Event, Job, carry_out, generations
 from tests.no_pictures import INSTEAD, draw_nothing
 from tests.processes import PATIENCE, python_process
@@ -129,6 +135,21 @@ def assert_as_here(job: Job, references: References) -> None:
     provenance = json.loads((job.directory / "provenance.json").read_text())
     assert provenance["finished"]
     assert provenance["argv"] == list(job.argv)
+
+
+def assert_packed_as_here(job: Job, study: Path, references: References) -> None:
+    reference = references.of(job)
+    run = run_at(study / job.name / f"seed-{job.config.seed}")
+    assert not isinstance(run, RunDirectory)
+    assert run.champion.to_json() == (reference / "champion.json").read_text()
+    tables = StudyDirectory(study).tables
+    found = tables.histories()[job.name, job.config.seed]
+    expected, _ = history_of(RunDirectory(reference), job.config.robot)
+    for name, column in expected.items():
+        assert np.array_equal(found[name], column), name
+    assert run.provenance["finished"]
+    assert run.provenance["commands"] == [shlex.join(job.argv)]
+    assert not (study / "running").exists()
 
 
 def failures(events: list[Event]) -> dict[str, str | None]:
@@ -465,9 +486,9 @@ def test_a_study_on_workers_of_its_own(
     assert "2 of 2 runs are finished" in stdout
     assert len(stdout.splitlines()) == 4
     for seed in (1, 2):
-        folder = tmp_path / "out" / "mine" / f"seed-{seed}"
+        folder = tmp_path / "out" / "running" / "mine" / f"seed-{seed}"
         job = Job("mine", config("ga", seed, **SMALL), folder, argv)
-        assert_as_here(job, references)
+        assert_packed_as_here(job, tmp_path / "out", references)
 
 
 def test_ctrl_c_ends_workers_of_its_own(preload, tmp_path):
@@ -486,7 +507,7 @@ def test_ctrl_c_ends_workers_of_its_own(preload, tmp_path):
         start_new_session=True,
     )
     try:
-        wait_until((tmp_path / "out" / "mine" / "seed-1" / "history.csv").exists)
+        wait_until((tmp_path / "out/running/mine/seed-1/history.csv").exists)
         # as a terminal does: to everybody
         os.killpg(process.pid, signal.SIGINT)
         _, stderr = process.communicate(timeout=PATIENCE)
@@ -534,9 +555,9 @@ def test_a_worker_and_then_the_scheduler_of_a_study_are_killed(
     assert (process.returncode, stderr) == (0, "")
     assert "2 of 2 runs are finished" in stdout
     for seed in (1, 2):
-        folder = tmp_path / "out" / "mine" / f"seed-{seed}"
+        folder = tmp_path / "out" / "running" / "mine" / f"seed-{seed}"
         job = Job("mine", config("ga", seed, **LONG), folder, tuple(argv))
-        assert_as_here(job, references)
+        assert_packed_as_here(job, tmp_path / "out", references)
 
 
 def workers_of(pid: int) -> list[int]:

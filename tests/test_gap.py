@@ -3,7 +3,6 @@
 import csv
 import json
 from dataclasses import fields, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,8 +34,9 @@ from evolution.gap.worlds import ARENAS, LATENCY_MAX, WORLD_RANGES, World, met, 
 from evolution.named_policies import NamedPolicy, named_policies
 from evolution.pages.blocks import to_markdown
 from evolution.pages.style import LOOKS
+from tests import shipped
 
-CHAMPION = Path(__file__).parent.parent / "results/paper/de-best/seed-1/champion.json"
+CHAMPION = shipped.champion_file()
 HOME = World(
     arena="arena",
     period=0.1,
@@ -264,7 +264,7 @@ def test_the_document_says_who_kept_what():
 
 
 def test_the_figure_names_experiments_as_reports_do():
-    policies = [*named_policies(str(CHAMPION.parent)), FOLLOWER]
+    policies = [*named_policies(str(shipped.CHAMPION)), FOLLOWER]
     groups = experiments(policies)
     members = [0, 1]
     transfer = Transfer(
@@ -358,8 +358,8 @@ def test_where_the_kinematic_robot_cannot_drive_wheels_are_enough(
     leaning = '<geom name="mast" type="cylinder" size=".02 .1" euler="20 0 0"/>'
     square = (MODELS / "arena.xml").read_text()
     arena.write_text(square.replace("</worldbody>", f"{leaning}</worldbody>"))
-    shipped = load_controller(CHAMPION)
-    there = replace(shipped, origin=replace(shipped.origin, arena=str(arena)))
+    known = load_controller(CHAMPION)
+    there = replace(known, origin=replace(known.origin, arena=str(arena)))
     (tmp_path / "champion.json").write_text(there.to_json())
     arguments = [str(tmp_path / "champion.json"), "--output", str(tmp_path / "gap")]
     assert measure_gap(arguments) == 0

@@ -20,9 +20,9 @@ from evolution.replay.__main__ import replay
 from evolution.replay.viewer_picture import headless_viewer, viewer_screenshot
 from tests.browser import MISSING, browser, until
 from tests.processes import PATIENCE, python_process
+from tests.shipped import champion_file
 
-ROOT = Path(__file__).parent.parent
-CHAMPION = ROOT / "results/paper/de-best/seed-1/champion.json"
+CHAMPION = champion_file()
 
 
 @pytest.fixture

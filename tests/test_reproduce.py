@@ -10,7 +10,10 @@ from evolution.reproduce import __main__ as module
 from evolution.reproduce.__main__ import reproduce_paper
 from evolution.reproduce.verdicts import OTHER_STUDY
 from evolution.run.means import Means
+from evolution.study.columns import table_of
+from evolution.study.directory import StudyDirectory
 from evolution.study.jobs import Event, Job, carry_out
+from evolution.study.table_files import write_table
 from tests.no_pictures import draw_nothing
 
 TINY = """
@@ -18,6 +21,8 @@ experiments: [ga.yaml, de-best.yaml]
 common:
   {evaluations: 20, steps: 20, trials: 2, validation_starts: 10, test_starts: 30}
 """
+EXPERIMENT, SEED = ("experiment",), ("seed",)
+
 EXPERIMENTS = {
     "ga": "optimizer: {algorithm: genetic_algorithm, population: 10}",
     "de-best": "optimizer: {algorithm: differential_evolution, population: 10, "
@@ -63,18 +68,21 @@ def test_one_command_runs_reports_and_judges_and_goes_on(here, monkeypatch, capf
     assert "Missing: no such study was given." in first
     for name in ("report.md", "report.html", "summary.json", "pairwise.csv"):
         assert (here / "out" / "report-tiny" / name).is_file()
-    runs = sorted((here / "out" / "tiny").glob("*/*/champion.json"))
-    assert len(runs) == 4
+    tables = StudyDirectory(here / "out" / "tiny").tables
+    assert len(tables.packed()) == 4
     # again: what is done is not done once more
-    before = [path.stat().st_mtime_ns for path in runs]
+    before = [path.stat().st_mtime_ns for path in (tables.champions, tables.history)]
     assert reproduce_paper(["--quick", "--output", "out"]) == 0
-    assert [path.stat().st_mtime_ns for path in runs] == before
+    assert before == [
+        path.stat().st_mtime_ns for path in (tables.champions, tables.history)
+    ]
     assert (here / "out" / "REPRODUCTION.md").read_text() == first
     # in processes, as ever: a run that cannot be done, somebody's own files are there,
     # stops nothing else
-    thesis = here / "out" / "tiny" / "ga" / "seed-2" / "thesis.tex"
-    for path in thesis.parent.iterdir():
-        path.unlink()
+    thesis = here / "out" / "tiny" / "running" / "ga" / "seed-2" / "thesis.tex"
+    kept = [row for row in tables.rows() if (row[EXPERIMENT], row[SEED]) != ("ga", 2)]
+    write_table(tables.champions, table_of(kept))
+    thesis.parent.mkdir(parents=True)
     thesis.write_text("years of work")
     assert reproduce_paper(["--quick", "--output", "out"]) == 1
     assert "ga seed 2 failed" in capfd.readouterr().err

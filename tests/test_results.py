@@ -8,46 +8,50 @@ import numpy as np
 import pytest
 
 from epuck_mj.errors import UserError
-from epuck_mj.policies.file import load_controller
 from epuck_mj.scene.model_files import MODELS
 from evolution.gap.gap_document import gap_document, gap_summary
 from evolution.gap.groups import experiments, peers
 from evolution.gap.transfer import Gap, Transfer
 from evolution.judging.held_out import Judges
-from evolution.judging.scores import Scores
 from evolution.named_policies import named_policies
 from evolution.pages.blocks import to_markdown
 from evolution.reproduce.publish import PAGES, pages_with_tables, shipped
 from evolution.run.directory import RunDirectory
+from evolution.study.addresses import run_at, runs_at
 from evolution.study.config import StudyConfig, find_study
 from evolution.study.data import load_study
+from evolution.study.packed_run import PackedRun
 
 ROOT = MODELS.parent
 RESULTS = ROOT / "results"
 STUDIES = shipped(RESULTS)
-RUNS = sorted(path.parent for path in RESULTS.glob("*/*/seed-*/champion.json"))
 SIZE_MAX = 20e6
 
 
 def test_runs_are_of_code_in_git_and_finished():
-    strays = [stray for run in RUNS for stray in strays_of(run)]
-    assert RUNS
+    runs = [
+        run
+        for table in RESULTS.glob("*/champions.parquet")
+        for run in runs_at(table.parent)
+        if not isinstance(run, RunDirectory)
+    ]
+    strays = [stray for run in runs for stray in strays_of(run)]
+    assert len(runs) > 80
     assert not strays, f"{len(strays)} strays: {strays}"
 
 
-def strays_of(run: Path) -> list[str]:
+def strays_of(run: PackedRun) -> list[str]:
     """What is wrong with a shipped run, a line each."""
-    provenance = json.loads((run / "provenance.json").read_text())
-    champion = json.loads((run / "champion.json").read_text())
+    provenance = run.provenance
     # however often it was gone on with
     parts = [provenance, *provenance.get("resumed", ())]
     sound = {
         # of those that made it: the models of today may be others
-        "models": provenance["mjcf_sha256"] == champion["scene"]["mjcf_sha256"],
+        "models": set(provenance["mjcf_sha256"]) >= {"arena", "robot"},
         "code": not any(part["git"]["modified"] for part in parts),
         "end": bool(provenance["finished"]),
     }
-    place = run.relative_to(RESULTS).as_posix()
+    place = run.path.relative_to(RESULTS).as_posix()
     return [f"{place}: {what}" for what, is_so in sound.items() if not is_so]
 
 
@@ -81,11 +85,11 @@ def test_a_shipped_champion_scores_the_same_on_this_machine():
     On the plane, and one that hardly touches walls; `evolution.verify` does the same
     on wheels, too, in half a minute.
     """
-    run = RunDirectory(RESULTS / "paper" / "random-search" / "seed-3")
-    champion, config = load_controller(run.champion), run.stored_config()
-    written = Scores.read(champion.scores, run.champion).held_out["epuck_planar"]
-    judge = Judges().of("epuck_planar", config.setting)
-    test = judge.test(champion.controller, written.starts)
+    run = run_at(RESULTS / "paper" / "random-search" / "seed-3")
+    assert not isinstance(run, RunDirectory)
+    written = run.scores.held_out["epuck_planar"]
+    judge = Judges().of("epuck_planar", run.config.setting)
+    test = judge.test(run.champion.controller, written.starts)
     assert test.starts == written.starts
     assert test.mean == pytest.approx(written.mean, abs=1)
     assert test.crash_rate == pytest.approx(written.crash_rate, abs=0.02)

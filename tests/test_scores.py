@@ -8,11 +8,13 @@ from pathlib import Path
 import pytest
 
 from epuck_mj.errors import UserError
-from epuck_mj.policies.file import load_controller
 from evolution.judging.scores import KnownScores, Scores
+from evolution.study.columns import table_of
+from evolution.study.directory import StudyDirectory
+from evolution.study.table_files import write_table
 
 RESULTS = Path(__file__).resolve().parent.parent / "results"
-CHAMPIONS = sorted(RESULTS.glob("*/*/seed-*/champion.json"))
+TABLES = sorted(RESULTS.glob("*/champions.parquet"))
 YARDSTICKS = sorted(RESULTS.glob("*/wall-follower.json"))
 OLD = {"mean": 100.0, "crash_rate": 0.1, "starts": 1000}
 """All that the oldest held-out evaluations say."""
@@ -37,13 +39,20 @@ def full() -> dict:
     }
 
 
-def test_every_shipped_champion_comes_back_byte_for_byte():
-    assert len(CHAMPIONS) > 80
-    for path in CHAMPIONS:
-        champion = load_controller(path)
-        scores = Scores.read(champion.scores, path)
-        again = replace(champion, scores=scores.to_dict())
-        assert again.to_json().encode() == path.read_bytes(), path
+def test_every_shipped_champion_comes_back_byte_for_byte(tmp_path):
+    n = 0
+    for path in TABLES:
+        study = StudyDirectory(path.parent)
+        runs = study.tables.runs(study.stored_config()).values()
+        for run in runs:
+            scores = Scores.read(run.champion.scores, path)
+            again = replace(run.champion, scores=scores.to_dict())
+            assert again.to_json() == run.champion.to_json(), run.path
+        table = table_of([run.row for run in runs])
+        write_table(tmp_path / "table.parquet", table)
+        assert (tmp_path / "table.parquet").read_bytes() == path.read_bytes()
+        n += len(runs)
+    assert n > 80
 
 
 def test_every_shipped_yardstick_comes_back_byte_for_byte():

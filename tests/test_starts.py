@@ -58,9 +58,8 @@ def test_spread_starts_are_more_even_than_random_ones(scene):
     space, reach = FreeSpace(scene, CLEARANCE), 0.5 - BODY_RADIUS - CLEARANCE
 
     def errors(draw) -> np.ndarray:
-        x, y, yaw = np.moveaxis(
-            [draw(np.random.default_rng(i), 200) for i in seeds], 2, 0
-        )
+        each = np.array([draw(np.random.default_rng(i), 200) for i in seeds])
+        x, y, yaw = np.moveaxis(each, 2, 0)
         # way to the nearest wall, and to the wall at x = reach straight ahead
         nearest = reach - np.maximum(abs(x), abs(y))
         facing = np.where(abs(yaw) < np.pi / 3, reach - x, 0)

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from epuck_mj.errors import UserError
@@ -22,6 +23,7 @@ from epuck_mj.host import files
 from evolution.run import execution
 from evolution.run.__main__ import evolve
 from evolution.run.directory import RunDirectory
+from evolution.run.history import HISTORY, ROBOT
 from evolution.run.lock import LOCK
 from evolution.run.means import Means
 from evolution.settings.config_files import load_config
@@ -30,7 +32,10 @@ from evolution.study import jobs
 from evolution.study.__main__ import study
 from evolution.study.config import StudyConfig
 from evolution.study.directory import StudyDirectory
+from evolution.study.histories import history_of
 from evolution.study.jobs import Event, Job, carry_out, failure_log, failure_of
+from evolution.study.packed_run import PackedRun
+from evolution.study.packing import Packer
 from tests.no_pictures import INSTEAD, draw_nothing
 from tests.processes import PATIENCE, python_process
 
@@ -49,7 +54,7 @@ EXPERIMENTS = {
 }
 SEEDS = (1, 2)
 RUNS = [(name, seed) for seed in SEEDS for name in EXPERIMENTS]
-REPRODUCED = ("history.csv", "champion.json")
+TABLES = ("champions.parquet", "history.parquet")
 
 LONG = 60
 """Evaluations of runs that are interrupted, in 6 generations."""
@@ -113,9 +118,28 @@ def make_quick(patch: pytest.MonkeyPatch) -> None:
     draw_nothing(patch)
 
 
-def assert_reproduced(directory: Path, reference: Path) -> None:
-    for name in REPRODUCED:
-        assert (directory / name).read_bytes() == (reference / name).read_bytes(), name
+def running(study: Path, name: str, seed: int) -> Path:
+    """The directory of a run that is not in the tables yet."""
+    return study / "running" / name / f"seed-{seed}"
+
+
+def packed(study: Path, name: str, seed: int) -> PackedRun:
+    """A run in the tables."""
+    directory = StudyDirectory(study)
+    return directory.tables.runs(directory.stored_config())[name, seed]
+
+
+def assert_reproduced(run: PackedRun, reference: Path) -> None:
+    """A run in the tables says what the directory of a run does."""
+    assert run.champion.to_json() == (reference / "champion.json").read_text()
+    history, _ = history_of(RunDirectory(reference), "epuck_kinematic")
+    assert set(run.history) == set(history)
+    for name, column in history.items():
+        assert np.array_equal(run.history[name], column), name
+
+
+def tables(study: Path) -> list[bytes]:
+    return [(study / name).read_bytes() for name in TABLES]
 
 
 def written(directory: Path) -> dict[str, int]:
@@ -142,6 +166,8 @@ class Carried:
 
     def __init__(self):
         self.jobs: list[Job] = []
+        self.resumed: list[int] = []
+        """How often each has been gone on with."""
 
     def __call__(
         self, jobs: Sequence[Job], means: Means, n_processes: int
@@ -149,6 +175,7 @@ class Carried:
         for job in jobs:
             self.jobs.append(job)
             carry_out(job, means, lambda evaluations: None)
+            self.resumed.append(len(provenance(job.directory).get("resumed", ())))
             yield Event(job, ended=True)
 
 
@@ -198,12 +225,14 @@ def run_processes(pid: int) -> list[int]:
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
-    """The folder of a study of which all is done."""
+    """The folder of a study of which all is done, killed before it packed its runs."""
     cwd = tmp_path_factory.mktemp("done")
     write_study(cwd)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(cwd)
         carried = carry_out_here(patch)
+        patch.setattr(Packer, "when_due", lambda self: None)
+        patch.setattr(Packer, "finish", lambda self: None)
         assert study(["mine.yaml", "--seeds", "1-2", "--output", "out"]) == 0
     assert [(job.name, job.config.seed) for job in carried.jobs] == RUNS
     return cwd / "out"
@@ -247,23 +276,24 @@ def test_every_run_is_the_same_as_alone(here, done, monkeypatch):
     make_quick(monkeypatch)
     out = here / "out"
     for name, seed in RUNS:
-        alone, there = (each / name / f"seed-{seed}" for each in (done, out))
+        alone, there = running(done, name, seed), packed(out, name, seed)
         # of each experiment one by the command for a single run
         if (name, seed) in (("one", 1), ("two", 2)):
             alone = here / "alone" / name
             argv = [f"{name}.yaml", "--seed", str(seed), "--output", str(alone)]
             assert evolve(argv) == 0
+            # what a run leaves by itself, but no pictures
+            run = RunDirectory(alone)
+            assert {path.name for path in running(done, name, seed).iterdir()} == {
+                path.name for path in alone.iterdir() if path not in run.pictures
+            }
         assert_reproduced(there, alone)
-        assert load_config(there / "config.yaml") == load_config(alone / "config.yaml")
-        assert provenance(there)["finished"]
-        # no more and no less than a run leaves by itself
-        assert {path.name for path in there.iterdir()} == {
-            path.name for path in alone.iterdir()
-        }
+        assert there.config == load_config(alone / "config.yaml")
+        assert there.provenance["finished"]
     assert not [path for path in out.rglob(".*") if path.name != LOCK]
-    names = {path.name for path in out.iterdir()}
     files = {".lock", "seeds.yaml", "study.yaml", "wall-follower.json"}
-    assert names == {"one", "two"} | files
+    files |= {*TABLES, "provenance.json", "timing.csv"}
+    assert {path.name for path in out.iterdir()} == files
     # a line for every run
     *lines, summary, report = process.stdout.splitlines()
     pattern = r"(\d)/4 (\w+) seed (\d): held-out .* crash\); stored \d+\.\d"
@@ -277,29 +307,30 @@ def test_every_run_is_the_same_as_alone(here, done, monkeypatch):
 
 
 def test_what_is_done_is_skipped(finished, carried, capsys):
-    before = written(finished / "one") | written(finished / "two")
+    path = running(finished, "one", 1)
+    config = load_config(path / "config.yaml")
     assert study(["mine.yaml", "--seeds", "1-2", "--output", "out"]) == 0
     assert carried.jobs == []
+    before = written(finished)
     # neither by who believes that it is not done yet
-    path = finished / "one" / "seed-1"
-    job = Job("one", load_config(path / "config.yaml"), path, ())
+    job = Job("one", config, path, (), finished)
     carry_out(job, Means(), lambda _: pytest.fail("it was done again"))
-    assert written(finished / "one") | written(finished / "two") == before
+    shutil.rmtree(finished / "running")
+    assert {name: before[name] for name in written(finished)} == written(finished)
     first, summary, _ = capsys.readouterr().out.splitlines()
     assert first == "4 of 4 runs were finished already"
     assert summary.startswith("4 of 4 runs are finished, ")
 
 
-def test_what_is_not_done_is(finished, carried, capsys):
-    expected = (finished / "two" / "seed-1" / "champion.json").read_bytes()
-    unfinish(finished / "two" / "seed-1")
-    kept = written(finished / "one" / "seed-2")
+def test_what_is_not_done_is(finished, done, carried, capsys):
+    expected = [running(done, *run) for run in RUNS]
+    unfinish(running(finished, "two", 1))
     assert study(["mine.yaml", "--seeds", "1-3", "--output", "out"]) == 0
     # all experiments of a seed before the next
     assert list(map(str, carried.jobs)) == ["two seed 1", "one seed 3", "two seed 3"]
-    assert written(finished / "one" / "seed-2") == kept
-    assert (finished / "two" / "seed-1" / "champion.json").read_bytes() == expected
-    assert provenance(finished / "two" / "seed-1")["finished"]
+    assert carried.resumed == [1, 0, 0]
+    for run, alone in zip(RUNS, expected, strict=True):
+        assert_reproduced(packed(finished, *run), alone)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "3 of 6 runs were finished already"
     assert [line.split(":")[0] for line in lines[1:4]] == [
@@ -309,20 +340,20 @@ def test_what_is_not_done_is(finished, carried, capsys):
     ]
 
 
-@pytest.mark.parametrize("damage", ["lost", "cut", "picture"])
-def test_a_run_that_has_lost_something_is_completed(damage, finished, carried):
-    path = finished / "two" / "seed-1" / "champion.json"
+@pytest.mark.parametrize("damage", ["lost", "cut", "best"])
+def test_a_run_that_has_lost_something_is_completed(damage, finished, done, carried):
+    path = running(finished, "two", 1) / "champion.json"
     expected = path.read_bytes()
     if damage == "lost":
         path.unlink()
     elif damage == "cut":
         path.write_bytes(expected[:100])
     else:
-        path.with_name("trajectory.png").unlink()
+        path.with_name("best_individuals.npz").unlink()
     argv = ["mine.yaml", "--seeds", "1-2", "--output", "out"]
     assert study(argv) == 0
     assert list(map(str, carried.jobs)) == ["two seed 1"]
-    assert path.read_bytes() == expected
+    assert_reproduced(packed(finished, "two", 1), running(done, "two", 1))
     assert study(argv) == 0
     assert len(carried.jobs) == 1
 
@@ -330,8 +361,8 @@ def test_a_run_that_has_lost_something_is_completed(damage, finished, carried):
 @pytest.mark.parametrize("name", ["config.yaml", "provenance.json", "checkpoint.npz"])
 def test_a_damaged_run_does_not_stop_the_others(name, finished, carried, monkeypatch):
     """It fails with a line, as long as it is not finished without that file."""
-    (finished / "two" / "seed-1" / name).write_text("[")
-    (finished / "two" / "seed-1" / "champion.json").unlink()
+    (running(finished, "two", 1) / name).write_text("[")
+    (running(finished, "two", 1) / "champion.json").unlink()
     events: list[Event] = []
 
     def carry_all_out(jobs, means, n_processes):
@@ -349,7 +380,7 @@ def test_a_damaged_run_does_not_stop_the_others(name, finished, carried, monkeyp
     assert [str(event.job) for event in events] == ["two seed 1"]
     assert name in str(events[0].failure)
     assert "\n" not in str(events[0].failure)
-    assert RunDirectory(finished / "two" / "seed-3").finished
+    assert packed(finished, "two", 3)
 
 
 def test_a_lost_or_damaged_yardstick_is_measured_again(here, monkeypatch):
@@ -369,15 +400,20 @@ def test_some_experiments_now_and_the_others_later(here, carried):
     assert study(argv) == 0
     assert list(map(str, carried.jobs)) == ["two seed 4", "one seed 4"]
     assert carried.jobs[0].argv == (*argv, "--experiments", "two")
-    assert provenance(here / "out" / "one" / "seed-4")["argv"] == argv
+    assert packed(here / "out", "one", 4).provenance["commands"] == [
+        shlex.join(argv),
+        shlex.join([*argv, "--experiments", "two"]),
+    ]
 
 
 def test_racing_changes_nothing(here, carried):
     argv = ["mine.yaml", "--seeds", "1", "--experiments", "one"]
     assert study([*argv, "--output", "with"]) == 0
     assert study([*argv, "--output", "without", "--no-racing"]) == 0
-    runs = [here / name / "one" / "seed-1" for name in ("with", "without")]
-    assert_reproduced(*runs)
+    one, other = (packed(here / name, "one", 1) for name in ("with", "without"))
+    assert one.champion.to_json() == other.champion.to_json()
+    for name in (*HISTORY, ROBOT):
+        assert np.array_equal(one.history[name], other.history[name])
 
 
 # bad input
@@ -437,16 +473,16 @@ def test_another_study_is_refused(here, carried):
 @pytest.mark.slow
 def test_a_run_that_fails_does_not_stop_the_others(finished, here):
     # another config, a file, a damaged checkpoint, and one to be done
-    other = finished / "one" / "seed-1"
+    other = running(finished, "one", 1)
     unfinish(other)
     text = (other / "config.yaml").read_text()
     (other / "config.yaml").write_text(text.replace("trials: 2", "trials: 3"))
-    shutil.rmtree(finished / "two" / "seed-1")
-    (finished / "two" / "seed-1").write_text("years of work")
-    damaged = finished / "one" / "seed-2" / "checkpoint.npz"
+    shutil.rmtree(running(finished, "two", 1))
+    running(finished, "two", 1).write_text("years of work")
+    damaged = running(finished, "one", 2) / "checkpoint.npz"
     unfinish(damaged.parent)
     damaged.write_bytes(damaged.read_bytes()[:-100])
-    shutil.rmtree(finished / "two" / "seed-2")
+    shutil.rmtree(running(finished, "two", 2))
     before = written(other) | written(damaged.parent)
     (here / "go").touch()
     argv = ["mine.yaml", "--seeds", "1-2", "--output", "out", "--jobs", "1"]
@@ -457,7 +493,7 @@ def test_a_run_that_fails_does_not_stop_the_others(finished, here):
     assert set(failed) == {"one seed 1", "one seed 2", "two seed 1"}
     assert "another config; these keys differ: " in failed["one seed 1"]
     assert "trials (stored 3, got 2)" in failed["one seed 1"]
-    assert "out/one/seed-2/checkpoint.npz" in failed["one seed 2"]
+    assert "out/running/one/seed-2/checkpoint.npz" in failed["one seed 2"]
     assert "two/seed-1" in failed["two seed 1"]
     assert set(summary.removeprefix("failed: ").split(", ")) == set(failed)
     first, second, _ = process.stdout.splitlines()
@@ -466,7 +502,7 @@ def test_a_run_that_fails_does_not_stop_the_others(finished, here):
     # what failed is as it was
     after = written(other) | written(damaged.parent)
     assert {path: after[path] for path in before} == before
-    assert (finished / "two" / "seed-1").read_text() == "years of work"
+    assert running(finished, "two", 1).read_text() == "years of work"
 
 
 def test_what_is_nobodys_to_put_right_leaves_a_log(here):
@@ -521,7 +557,7 @@ def test_a_run_killed_alone_is_reported_and_the_next_call_completes_it(
 ):
     write_study(here, evaluations=LONG)
     argv = ["mine.yaml", "--experiments", "one", "--seeds", "1-2", "--output", "out"]
-    one, two = (here / "out" / "one" / f"seed-{seed}" for seed in SEEDS)
+    out, one = here / "out", running(here / "out", "one", 1)
     with python_process("halting.py", *argv, "--jobs", "1", cwd=here) as process:
         wait_for(lambda: n_records(one) > 2)
         (victim,) = run_processes(process.pid)
@@ -534,18 +570,17 @@ def test_a_run_killed_alone_is_reported_and_the_next_call_completes_it(
         "failed: one seed 1",
     ]
     assert stdout.startswith("1/2 one seed 2: ")
-    assert_reproduced(two, reference / "seed-2")
+    assert_reproduced(packed(out, "one", 2), reference / "seed-2")
     assert provenance(one)["finished"] is None
-    kept, done = written(two), n_records(one)
+    assert n_records(one) > 2
     assert study(argv) == 0
     assert list(map(str, carried.jobs)) == ["one seed 1"]
-    assert_reproduced(one, reference / "seed-1")
-    assert written(two) == kept
+    for seed in SEEDS:
+        assert_reproduced(packed(out, "one", seed), reference / f"seed-{seed}")
     # gone on with, not begun again
-    assert done > 2
-    rows = (one / "timing.csv").read_text().splitlines()[1:]
-    assert [int(row.split(",")[0]) for row in rows] == list(range(LONG // 10))
-    assert len(provenance(one)["resumed"]) == 1
+    assert carried.resumed == [1]
+    assert shlex.join(argv) in packed(out, "one", 1).provenance["commands"]
+    assert not (out / "running").exists()
 
 
 @contextmanager
@@ -559,7 +594,7 @@ def interrupted(
     write_study(here, evaluations=LONG)
     argv = ["mine.yaml", "--experiments", "one", "--output", "out"]
     argv += ["--seeds", ",".join(map(str, seeds)), "--jobs", "2"]
-    directories = [here / "out" / "one" / f"seed-{seed}" for seed in seeds]
+    directories = [running(here / "out", "one", seed) for seed in seeds]
     with python_process("halting.py", *argv, cwd=here) as process:
         wait_for(lambda: len(run_processes(process.pid)) == len(seeds))
         if begun:
@@ -570,14 +605,19 @@ def interrupted(
 
 
 def assert_completed(
-    here: Path, argv: Sequence[str], seeds: Sequence[int], reference: Path
+    here: Path,
+    argv: Sequence[str],
+    seeds: Sequence[int],
+    reference: Path,
+    carried: Carried,
 ) -> None:
-    directories = [here / "out" / "one" / f"seed-{seed}" for seed in seeds]
+    directories = [running(here / "out", "one", seed) for seed in seeds]
     assert all(n_records(each) < LONG // 10 for each in directories)
     assert study(argv) == 0
-    for seed, directory in zip(seeds, directories, strict=True):
-        assert_reproduced(directory, reference / f"seed-{seed}")
-        assert len(provenance(directory)["resumed"]) == 1
+    for seed in seeds:
+        run = packed(here / "out", "one", seed)
+        assert_reproduced(run, reference / f"seed-{seed}")
+    assert carried.resumed == [1] * len(seeds)
     assert not [*here.rglob("*.failure.txt")]
 
 
@@ -608,7 +648,7 @@ def test_a_signal_ends_all_and_says_how_to_go_on(
     assert Path(python).name.startswith("python")
     assert arguments == ["-m", "evolution.study", *typed]
     if begun:
-        assert_completed(here, typed, seeds, reference)
+        assert_completed(here, typed, seeds, reference, carried)
 
 
 @linux
@@ -620,7 +660,33 @@ def test_runs_end_when_their_study_is_killed(here, carried, reference):
         _, stderr = process.communicate(timeout=PATIENCE)
     assert process.returncode == -signal.SIGKILL
     assert stderr == ""
-    assert_completed(here, typed, (1,), reference)
+    assert_completed(here, typed, (1,), reference, carried)
+
+
+@linux
+@pytest.mark.slow
+def test_tables_have_the_same_bytes_after_any_kill(here):
+    """Killed before the first run has ended, after it, and once more."""
+    write_study(here, evaluations=LONG)
+    (here / "go").touch()
+    argv = ["quick.py", "mine.yaml", "--seeds", "1-3", "--jobs", "2", "--output"]
+    assert finish(here, *argv, "whole").returncode == 0
+    out = here / "killed"
+    moments = (
+        lambda: any(map(n_records, (out / "running").glob("*/*"))),
+        lambda: (out / "champions.parquet").exists(),
+        lambda: len(StudyDirectory(out).tables.packed()) > 2,
+    )
+    for moment in moments:
+        with python_process(*argv, "killed", cwd=here) as process:
+            wait_for(lambda moment=moment: moment() or process.poll() is not None)
+            process.kill()
+            process.communicate(timeout=PATIENCE)
+    done = finish(here, *argv, "killed")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "6 of 6 runs are finished" in done.stdout
+    assert tables(out) == tables(here / "whole")
+    assert not (out / "running").exists()
 
 
 # one process in a directory

@@ -373,7 +373,7 @@ def test_a_new_directory_holds_the_study(here):
     names = sorted(path.name for path in directory.path.iterdir())
     assert names == [".lock", "seeds.yaml", "study.yaml"]
     assert directory.stored_config() == config
-    assert directory.run("ga", 3).path == directory.path / "ga" / "seed-3"
+    assert directory.run("ga", 3).path == directory.path / "running" / "ga" / "seed-3"
     before = directory.config.read_bytes()
     # again, and with less
     directory.open(config.only(["de-best"]), [2, 7])

@@ -20,7 +20,8 @@ from tests.study_on_disk import write_study
 
 @pytest.fixture
 def path(tmp_path) -> Path:
-    return write_study(tmp_path / "study", {"de-best": [1, 2], "ga": [1, 2]})
+    seeds = {"de-best": [1, 2], "ga": [1, 2]}
+    return write_study(tmp_path / "study", seeds, packed=False)
 
 
 def edit(file: Path, change: Callable[[dict], object]) -> None:
@@ -49,7 +50,7 @@ DAMAGE: dict[str, Callable[[dict], object]] = {
 
 @pytest.mark.parametrize("damage", DAMAGE)
 def test_a_damaged_champion_is_missing_and_the_others_are_there(path, damage):
-    edit(path / "ga" / "seed-2" / "champion.json", DAMAGE[damage])
+    edit(path / "running" / "ga" / "seed-2" / "champion.json", DAMAGE[damage])
     study = load_study(path)
     assert [run.seed for run in study.runs["ga"]] == [1]
     assert [run.seed for run in study.runs["de-best"]] == [1, 2]
@@ -82,7 +83,7 @@ def test_a_damaged_yardstick_is_missing_and_the_runs_are_there(path, text):
     ids=str,
 )
 def test_edited_provenance_is_named(path, change):
-    file = path / "ga" / "seed-1" / "provenance.json"
+    file = path / "running" / "ga" / "seed-1" / "provenance.json"
     edit(file, lambda fields: fields.update(change))
     data = load_study(path)
     assert origins(data)["git"]
@@ -116,7 +117,7 @@ CONTENTS: dict[str, Callable[[bytes], bytes]] = {
 )
 def test_one_damaged_file_takes_no_report_down(name, damage, path):
     """The run is named and left out, or it can be reported without the file."""
-    file = path / "ga" / "seed-1" / name
+    file = path / "running" / "ga" / "seed-1" / name
     content = file.read_bytes()
     file.unlink()
     if damage == "a folder":
@@ -139,7 +140,7 @@ def test_one_damaged_file_takes_no_report_down(name, damage, path):
 def test_seeds_that_were_asked_for_are_missed(path):
     assert load_study(path).missing == ()
     (path / "seeds.yaml").write_text("de-best: 1-30\nga: 1-3\nde-rand: '4'\n")
-    (path / "ga" / "seed-3").mkdir()
+    (path / "running" / "ga" / "seed-3").mkdir()
     assert load_study(path).missing == (
         "de-best seeds 3-30: asked for, not there",
         "ga seed 3: not finished",
@@ -148,24 +149,24 @@ def test_seeds_that_were_asked_for_are_missed(path):
 
 @pytest.mark.parametrize("row", ["2,0,1.0,1.0,1.0", "2,450,inf,1.0,1.0", "2,450,1.0"])
 def test_a_damaged_history_is_named(path, row):
-    file = path / "ga" / "seed-1" / "history.csv"
+    file = path / "running" / "ga" / "seed-1" / "history.csv"
     file.write_text(file.read_text() + row + "\n")
     with pytest.raises(UserError, match="is damaged"):
         read_history(file)
 
 
 def test_a_copied_run_does_not_count_twice(path):
-    run = path / "ga" / "seed-1"
+    run = path / "running" / "ga" / "seed-1"
     for name in ("seed-01", "seed-²", "seed-"):
-        (path / "ga" / name).mkdir()
+        (path / "running" / "ga" / name).mkdir()
         for file in run.iterdir():
-            (path / "ga" / name / file.name).write_bytes(file.read_bytes())
+            (path / "running" / "ga" / name / file.name).write_bytes(file.read_bytes())
     assert [run.seed for run in load_study(path).runs["ga"]] == [1, 2]
 
 
 def test_nothing_finished_is_said_in_few_words(tmp_path):
-    path = write_study(tmp_path / "study", {"ga": list(range(1, 13))})
-    for champion in path.glob("*/*/champion.json"):
+    path = write_study(tmp_path / "study", {"ga": list(range(1, 13))}, packed=False)
+    for champion in path.glob("running/*/*/champion.json"):
         champion.unlink()
     with pytest.raises(UserError, match="no finished run") as error:
         load_study(path)

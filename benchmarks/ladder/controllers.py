@@ -6,20 +6,23 @@ evolved on each simulator, besides some that did not evolve far.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
-from epuck_mj.policies.file import load_controller
+from epuck_mj.policies.file import CHAMPIONS
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.topology import Topology
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.scene.model_files import KINEMATIC_ROBOT
 from epuck_mj.step.control import BatchPolicy, TaskParameters
 from evolution.run.champion import choose_champion, stored_by
+from evolution.run.directory import RunDirectory
 from evolution.run.generation_loop import Evolution
-from evolution.run.history import read_best_individuals
 from evolution.settings.config_files import find_config, load_config
+from evolution.study.addresses import runs_at
+from evolution.study.packed_run import PackedRun
 
 CHAMPION, EARLIER, RANDOM, BY_HAND = "champion", "earlier", "random", "by hand"
 
@@ -70,13 +73,13 @@ def tried(results: Path, evolved: dict[str, list[float]]) -> list[Tried]:
 
     Args:
         results: folder with studies.
-        evolved: genomes of the runs made here, by name; those that it lacks are evolved
-            and added.
+        evolved: genomes of the runs made here and of earlier generations, by name;
+            those that it lacks are evolved and added.
     """
     task, nothing = TaskParameters(), np.zeros(0)
     found = [Tried("wall-follower", BY_HAND, "", task, None, nothing)]
-    for path in sorted(results.glob("*/*/seed-*/champion.json"), key=_by_seed):
-        found += _of_run(path.parent, path.parent.relative_to(results).as_posix())
+    for run in _runs(results):
+        found += _of_run(run, run.path.relative_to(results).as_posix(), evolved)
     found += _on_kinematic_robot(evolved)
     genomes = np.random.default_rng(2026).uniform(-5, 5, (N_RANDOM, Network().n_genes))
     for i, genome in enumerate(genomes):
@@ -84,22 +87,34 @@ def tried(results: Path, evolved: dict[str, list[float]]) -> list[Tried]:
     return found
 
 
-def _by_seed(champion: Path) -> tuple[Path, int]:
-    return champion.parents[1], int(champion.parent.name.removeprefix("seed-"))
+def _runs(results: Path) -> Iterator[PackedRun]:
+    """The runs of all studies, by study, experiment and seed."""
+    for table in sorted(results.glob(f"*/{CHAMPIONS}")):
+        for run in runs_at(table.parent, histories=True):
+            if not isinstance(run, RunDirectory):
+                yield run
 
 
-def _of_run(run: Path, name: str) -> Iterator[Tried]:
+def _of_run(
+    run: PackedRun, name: str, evolved: dict[str, list[float]]
+) -> Iterator[Tried]:
     """The champion of a run and, of the first runs, the best of earlier generations."""
-    file = load_controller(run)
+    file = run.champion
     robot, network = Path(file.origin.robot).stem, file.network
     yield Tried(name, CHAMPION, robot, file.task, network, file.genome)
-    if _by_seed(run / "champion.json")[1] > EARLIER_SEEDS:
+    if run.seed > EARLIER_SEEDS:
         return
-    genomes, _ = read_best_individuals(run / "best_individuals.npz", network.n_genes)
     for share in SHARES:
-        generation = round(share * len(genomes))
+        generation = round(share * len(run.history["best"]))
         which = f"{name}, generation {generation}"
-        yield Tried(which, EARLIER, robot, file.task, network, genomes[generation])
+        if which not in evolved:
+            # no table has it: the run is done again until then
+            evolution = Evolution(run.config)
+            for _ in islice(evolution.run(), generation + 1):
+                pass
+            evolved[which] = evolution.best_genomes[generation].tolist()
+        genome = np.array(evolved[which])
+        yield Tried(which, EARLIER, robot, file.task, network, genome)
 
 
 def _on_kinematic_robot(evolved: dict[str, list[float]]) -> Iterator[Tried]:

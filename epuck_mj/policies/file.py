@@ -20,6 +20,9 @@ FORMAT = "epuck_mj.controller/1"
 CHAMPION = "champion.json"
 """Controller file in the directory of a finished run."""
 
+CHAMPIONS = "champions.parquet"
+"""Table of champions in the directory of a study, which only `evolution` reads."""
+
 
 @dataclass(frozen=True)
 class Origin:
@@ -130,9 +133,14 @@ def champion_file(path: Path) -> Path:
     """The controller file at a path: of the directory of a run, its champion's.
 
     Raises:
-        UserError: if the run has no champion yet.
+        UserError: if the run has no champion yet, or is in the tables of a study.
     """
     if not is_directory(path):
+        if not path.exists() and is_file(path.parent.parent / CHAMPIONS):
+            raise UserError(
+                f"no file '{path}': runs of that study are rows of a table; expected a "
+                f"file, as python -m evolution.export {path} champion.json writes it"
+            )
         return path
     if not is_file(path / CHAMPION):
         raise UserError(f"no champion in '{path}': its run is not finished")

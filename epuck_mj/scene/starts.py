@@ -170,7 +170,7 @@ class FreeSpace:
         # it loads much of scipy, for those who choose or test champions
         from scipy.stats.qmc import Sobol
 
-        points = Sobol(3, seed=rng)
+        points = Sobol(3, rng=rng)
         return self._accepted(lambda: points.random(BLOCK), n)
 
     def _accepted(self, draw: Callable[[], np.ndarray], n: int) -> np.ndarray:

@@ -38,7 +38,7 @@ https://iohanalyzer.liacs.nl, or with the Python package `iohinspector`.
   evaluation 1, which says 0: the lowest fitness there is.
 - `raw_y` is the best stored fitness so far: what the algorithm believes. Held-out
   fitness, which the report compares by, has no history.
-- `best.x` is empty: the genomes are in `best_individuals.npz` of the runs.
+- `best.x` is empty: the genomes of champions are in `champions.parquet` of the study.
 """
 
 

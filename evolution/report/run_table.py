@@ -1,18 +1,13 @@
 """The table of runs, runs.csv: what each run found."""
 
 import math
-import re
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any, TypeVar
 
-from epuck_mj.errors import UserError
-from epuck_mj.host.files import read_text
 from evolution.judging.scores import HeldOut
 from evolution.pages.words import robot_name
 from evolution.report.measures import shown_robots
-from evolution.run.directory import RunDirectory
-from evolution.run.history import csv_columns
+from evolution.study.columns import prefixes
 from evolution.study.data import RunData, StudyData
 
 T = TypeVar("T")
@@ -22,18 +17,6 @@ Column = tuple[Callable[[T], Any], str, str]
 
 FITNESS = "fitness"
 """Stands for the unit of fitness, which names the highest fitness of a study."""
-
-
-def control_steps(run: RunData) -> int | None:
-    """Control steps that a run took, None if it did not count them."""
-    try:
-        columns = csv_columns(read_text(RunDirectory(run.path).timing))
-        steps = map(int, columns["control_steps"])
-        # in older files a generation that was done twice stands twice
-        each = dict(zip(columns["generation"], steps, strict=True))
-    except (UserError, KeyError, ValueError):
-        return None
-    return sum(each.values()) or None
 
 
 TEST_COLUMNS: Mapping[str, Column[HeldOut]] = {
@@ -97,11 +80,11 @@ RUN_COLUMNS: Mapping[str, Column[RunData]] = {
         "individual evaluations spent",
     ),
     "control_steps": (
-        control_steps,
+        lambda run: run.control_steps,
         "control steps",
         "those of all trials of the evolution",
     ),
-    "path": (lambda run: run.path.as_posix(), "", "directory of the run"),
+    "path": (lambda run: run.path.as_posix(), "", "name of the run for commands"),
 }
 """Columns of a run beside its tests."""
 
@@ -121,7 +104,7 @@ def described_columns(data: StudyData) -> list[dict[str, str]]:
         "experiment": ("", "name of the experiment"),
         "seed": ("", "seed of the run"),
     }
-    for robot, prefix in _prefixes(data).items():
+    for robot, prefix in prefixes(shown_robots(data)).items():
         for column, (_, unit, meaning) in TEST_COLUMNS.items():
             meaning = f"champion on the {robot_name(robot)}: {meaning}"
             found[f"{prefix}_{column}"] = (unit, meaning)
@@ -134,18 +117,9 @@ def described_columns(data: StudyData) -> list[dict[str, str]]:
     ]
 
 
-def _prefixes(data: StudyData) -> dict[str, str]:
-    """Beginning of the column names of each robot, by the robot's name or path."""
-    found: dict[str, str] = {}
-    for robot in shown_robots(data):
-        name = re.sub("[^a-z0-9]+", "_", Path(robot).stem.lower()).strip("_") or "robot"
-        found[robot] = name if name not in found.values() else f"{name}_{len(found)}"
-    return found
-
-
 def _run_row(data: StudyData, name: str, run: RunData) -> dict[str, Any]:
     row: dict[str, Any] = {"experiment": name, "seed": run.seed}
-    for robot, prefix in _prefixes(data).items():
+    for robot, prefix in prefixes(shown_robots(data)).items():
         test = run.scores.held_out[robot]
         for column, (value, _, _) in TEST_COLUMNS.items():
             row[f"{prefix}_{column}"] = value(test)

@@ -65,9 +65,25 @@ def with_noise(data: StudyData, name: str) -> bool:
     return data.configs[name].noise != "none"
 
 
+def believed_on(data: StudyData) -> str:
+    """The robot on which stored fitness is compared with tests.
+
+    The one on which evolution ended, where most believed individuals were tested; the
+    first that champions were tested on, if runs differ in it or do not say.
+    """
+    found = {
+        believed.robot
+        for runs in data.with_runs.values()
+        for run in runs
+        if (believed := run.scores.most_believed) is not None
+    }
+    (robot, *others) = found or {""}
+    return robot if robot in data.robots and not others else data.robots[0]
+
+
 def like_for_like(data: StudyData, name: str) -> np.ndarray:
     """Held-out fitness of champions as they evolved, `(n,)`; nan if not tested so."""
-    robot = data.robots[0]
+    robot = believed_on(data)
     if not with_noise(data, name):
         return data.held_out(name, robot)
     return np.array([run.held_out_as_evolved(robot) for run in data.runs[name]])
@@ -76,7 +92,7 @@ def like_for_like(data: StudyData, name: str) -> np.ndarray:
 def most_believed_fitness(data: StudyData, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Stored and held-out fitness of each run's most believed individual, `(n,)`.
 
-    Held-out on the robot that is reported; of the runs that say. None say of
+    Held-out on the robot of `believed_on`; of the runs that say. None say of
     experiments with noise: theirs was tested on ideal robots only.
     """
     if with_noise(data, name):

@@ -1,6 +1,6 @@
 """Ships the studies in runs/: `python -m evolution.reproduce.publish`.
 
-Copies the small files of each finished run, writes the reports and the verdicts on the
+Copies the tables of finished runs, writes the reports and the verdicts on the
 paper's claims, and puts the tables into the README and the pages of docs/.
 """
 
@@ -61,22 +61,27 @@ def shipped(results: Path) -> list[Path]:
 
 
 def ship(source: Path, target: Path) -> None:
-    """Copy the study and its finished runs, if any, without what can be made anew."""
+    """Add the finished runs of a study, if any, to a copy of the study.
+
+    Runs that the copy has already are replaced, and its other runs stay.
+    """
+    # arrow is for a command that makes sense
+    from evolution.study.packing import pack
+
     study, copies = StudyDirectory(source), StudyDirectory(target)
-    names = study.stored_config().experiments
-    pairs: list[tuple[Path, Path]] = []
-    for name in names:
-        for seed in study.seeds(name):
-            run, copy = study.run(name, seed), copies.run(name, seed)
-            if run.finished:
-                pairs += zip(run.kept, copy.kept, strict=True)
-    if pairs:
-        pairs.append((study.config, copies.config))
-        pairs.append((study.asked, copies.asked))
-        pairs.append((study.yardstick, copies.yardstick))
-    for path, copy in pairs:
+    pack(study)
+    config = study.stored_config()
+    runs = list(study.tables.runs(config).values())
+    if not runs:
+        return
+    target.mkdir(parents=True, exist_ok=True)
+    copies.tables.add(runs, list(config.experiments), again=True)
+    for path, copy in (
+        (study.config, copies.config),
+        (study.asked, copies.asked),
+        (study.yardstick, copies.yardstick),
+    ):
         if path.exists():
-            copy.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, copy)
 
 

@@ -15,9 +15,15 @@ from evolution.pages.blocks import (
     Table,
     to_markdown,
 )
-from evolution.pages.words import SPREAD, label, median_and_quartiles, spread
+from evolution.pages.words import (
+    PAPERS,
+    SPREAD,
+    label,
+    median_and_quartiles,
+    spread,
+)
 from evolution.report.measures import shown_robots
-from evolution.report.samples import kept, most_believed_fitness
+from evolution.report.samples import believed_on, kept, most_believed_fitness
 from evolution.reproduce.claim import Claim
 from evolution.reproduce.claims import (
     REPLICATES,
@@ -25,6 +31,7 @@ from evolution.reproduce.claims import (
     held_out_order,
     held_out_pairs,
     tally,
+    unlike,
 )
 from evolution.reproduce.differences_from_paper import differences_from_paper
 from evolution.reproduce.first_generation import FirstGeneration
@@ -57,6 +64,7 @@ def reproduction(
             "2012). Made by"
         ),
         Code([made_by]),
+        *_provisional(study),
         *settled_blocks(study, held_out_pairs(study, WHEELED_ROBOT), found),
         Heading("What there is"),
         *_there(study),
@@ -111,6 +119,23 @@ def reproduction(
         *differences_from_paper(study),
     ]
     return to_markdown(blocks)
+
+
+PLANNED = 100
+"""Runs of each of the paper's algorithms that docs/method.md plans."""
+
+
+def _provisional(study: StudyData) -> list[Block]:
+    """What is said of a study of the paper with fewer runs than planned."""
+    fewest = min(len(study.runs.get(name, ())) for name in PAPERS)
+    if fewest >= PLANNED or unlike(study):
+        return []
+    return [
+        Paragraph(
+            f"Provisional: there are {fewest} of the {PLANNED} runs of each algorithm "
+            "that docs/method.md plans. Verdicts may change until all are there."
+        )
+    ]
 
 
 def runs_table(study: StudyData) -> Table:
@@ -173,7 +198,7 @@ def _claims(found: Sequence[Claim]) -> Table:
 
 def _hidden(study: StudyData) -> list[Block]:
     """Blocks about the individuals with the highest stored fitness."""
-    robot, rows = study.robots[0], []
+    robot, rows = believed_on(study), []
     for name, runs in study.runs.items():
         stored, held_out = most_believed_fitness(study, name)
         if stored.size:
@@ -191,7 +216,7 @@ def _hidden(study: StudyData) -> list[Block]:
     return [
         Paragraph(
             "The individual with the highest stored fitness of each run, which is what "
-            f"the paper reports, and what 1,000 fresh starts on {robot} say of it; "
+            f"the paper reports, and what fresh starts on {robot} say of it; "
             f"then the champion, chosen on validation starts. {SPREAD}."
         ),
         Table(

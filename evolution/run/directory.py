@@ -25,9 +25,16 @@ if TYPE_CHECKING:
 class RunDirectory:
     """Files of a run, which is resumed from its config and checkpoint."""
 
-    def __init__(self, path: Path):
-        """Name the directory, without touching it."""
+    def __init__(self, path: Path, drawn: bool = True):
+        """Name the directory, without touching it.
+
+        Args:
+            path: of the directory.
+            drawn: whether pictures and a recording of the champion belong to the run;
+                runs of a study go without.
+        """
         self.path = path
+        self.drawn = drawn
         self.config = path / "config.yaml"
         self.provenance = path / "provenance.json"
         self.checkpoint = path / "checkpoint.npz"
@@ -242,6 +249,8 @@ class RunDirectory:
     @property
     def pictures(self) -> tuple[Path, ...]:
         """Files that show the champion of a finished run."""
+        if not self.drawn:
+            return ()
         return (
             self.fitness_figure,
             self.trajectory,

@@ -13,12 +13,13 @@ from epuck_mj.scene.model_files import KINEMATIC_ROBOT
 from evolution.judging.held_out import Judges
 from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
-from evolution.run.generation_loop import Evolution
+from evolution.run.generation_loop import Evolution, Place
 from evolution.run.history import Record
 from evolution.run.means import Means
 from evolution.run.provenance import provenance
 from evolution.run.results import Stage, silent, write_results
 from evolution.settings.config import ExperimentConfig
+from evolution.settings.setting import Setting
 
 SAVING_SHARE = 0.05
 """Largest share of time for checkpoints, where generations are short."""
@@ -35,6 +36,35 @@ def _notes(config: ExperimentConfig, judges: Judges) -> Iterator[str]:
         )
 
 
+PLACES_KEPT = 4
+"""Number of places that a process keeps."""
+
+
+class Loaded:
+    """Models, free space and judges, which runs of one process share."""
+
+    def __init__(self, threads: int):
+        """Start with nothing; `threads` step the judges' robots, 0 is one per core."""
+        self._threads = threads
+        self.judges = Judges(threads)
+        self._places: dict[tuple[str, bool, Setting], Place] = {}
+
+    def place(self, config: ExperimentConfig) -> Place:
+        """Where the robots of a run drive.
+
+        Raises:
+            UserError: if robot or arena cannot be used.
+        """
+        robot, setting = config.robot, config.setting
+        key = robot, config.climbs, setting
+        if key not in self._places:
+            if len(self._places) == PLACES_KEPT:
+                self._places, self.judges = {}, Judges(self._threads)
+            place = self._places[key] = Place.of(config)
+            self.judges.add(robot, setting, place.scene, place.space)
+        return self._places[key]
+
+
 class Run:
     """A run and its directory."""
 
@@ -44,6 +74,7 @@ class Run:
         directory: RunDirectory,
         means: Means,
         argv: Sequence[str],
+        loaded: "Loaded | None" = None,
     ):
         """Load everything that the run needs, without writing anything.
 
@@ -52,18 +83,20 @@ class Run:
             directory: where to write.
             means: how to do it.
             argv: what was asked for, for the provenance.
+            loaded: what runs before this one have loaded.
 
         Raises:
             UserError: if robot or arena cannot be used, or the budget is too small.
         """
-        self.evolution = Evolution(config, means.engine, means.threads, means.racing)
+        loaded = loaded or Loaded(means.threads)
+        self.evolution = Evolution(
+            config, means.engine, means.threads, means.racing, loaded.place
+        )
         self.directory = directory
         # found out now, not after the evolution
-        judges = Judges(means.threads)
-        scene, space = self.evolution.scene, self.evolution.space
-        judges.add(config.robot, config.setting, scene, space)
-        self._judges = judges.tested_on(config.robot, config.setting)
-        self.notes = tuple(_notes(config, judges))
+        scene = self.evolution.scene
+        self._judges = loaded.judges.tested_on(config.robot, config.setting)
+        self.notes = tuple(_notes(config, loaded.judges))
         """What somebody who waits for the run should know, a line each."""
         self._provenance = provenance(
             scene, config.own_parts, argv, str(means.engine), means.threads

@@ -5,7 +5,7 @@ result. Randomness is keyed by what it is for: `random_generator(seed, purpose, 
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import astuple, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,34 @@ EngineMaker = Callable[[Scene], Engine]
 """Makes the engine for a scene; its `str` is what the provenance calls it."""
 
 
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where the robots of a run drive.
+
+    Attributes:
+        scene: the robot that the run begins with, in its arena.
+        space: where that robot may start.
+        wheels: the robot that the run climbs to there; `scene` if it does not climb.
+    """
+
+    scene: Scene
+    space: FreeSpace
+    wheels: Scene
+
+    @classmethod
+    def of(cls, config: ExperimentConfig) -> "Place":
+        """The place of a config, loaded.
+
+        Raises:
+            UserError: if robot or arena cannot be used.
+        """
+        scene = load_scene(config.robot, config.arena, config.control_step)
+        space, wheels = FreeSpace(scene, config.start_clearance), scene
+        if config.climbs:
+            wheels = load_scene(WHEELED_ROBOT, config.arena, config.control_step)
+        return cls(scene, space, wheels)
+
+
 class Evolution:
     """A run of evolution that can be stopped and resumed between generations.
 
@@ -46,6 +74,7 @@ class Evolution:
         engine: str | EngineMaker = "batch",
         threads: int = 0,
         racing: bool = True,
+        place: "Callable[[ExperimentConfig], Place] | None" = None,
     ):
         """Load the scene and draw the first population.
 
@@ -55,6 +84,7 @@ class Evolution:
                 what they give.
             threads: of the batch engine; 0 is one per core.
             racing: break off individuals that can only lose; changes no result.
+            place: gives where the config's robots drive; None loads it.
 
         Raises:
             UserError: if robot or arena cannot be used, the budget is too small, or
@@ -62,11 +92,8 @@ class Evolution:
         """
         check_needs(config)
         self.config = config
-        self.scene = load_scene(config.robot, config.arena, config.control_step)
-        self.space = FreeSpace(self.scene, config.start_clearance)
-        self._wheels = self.scene
-        if config.climbs:
-            self._wheels = load_scene(WHEELED_ROBOT, config.arena, config.control_step)
+        where = (place or Place.of)(config)
+        self.scene, self.space, self._wheels = where.scene, where.space, where.wheels
         self._maker: EngineMaker = (
             (lambda scene: make_engine(engine, scene, config, threads))
             if isinstance(engine, str)

@@ -136,6 +136,11 @@ def timing_text(
     return "".join(["generation,seconds,control_steps,crash_rate\n", *lines])
 
 
+def table_text(path: Path) -> str:
+    """The text of a table beside a history; empty if there is none."""
+    return files.read_text(path) if files.is_file(path) else ""
+
+
 def csv_columns(text: str) -> dict[str, list[str]]:
     """Columns of a text of comma-separated values, by name; empty what a row lacks."""
     header, *rows = [line.split(",") for line in text.splitlines()] or [[]]

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,8 +51,8 @@ def provenance(
         "threads": threads,
         "versions": {
             "python": platform.python_version(),
-            **{package: version(package) for package in PACKAGES},
-            "blas": _blas(),
+            **_versions(),
+            "blas": blas(),
         },
         "git": _git(),
         "mjcf_sha256": dict(scene.sha256),
@@ -63,7 +64,14 @@ def provenance(
     }
 
 
-def _blas() -> str:
+@cache
+def _versions() -> Mapping[str, str]:
+    """Versions of the packages that decide on results."""
+    return {package: version(package) for package in PACKAGES}
+
+
+@cache
+def blas() -> str:
     """Name and version of numpy's linear algebra, on which CMA-ES depends."""
     blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
     return f"{blas['name']} {blas['version']}"
@@ -83,11 +91,14 @@ class _Provenance(BaseModel, frozen=True, strict=True):
     """What a provenance file says, if it says it."""
 
     argv: list[str] = []
+    commands: list[str] = []
     versions: dict[str, str] = {}
     git: _Git | None = None
     mjcf_sha256: dict[str, str] = {}
     own_sha256: dict[str, str] = {}
+    threads: int | list[int] | None = None
     processor: _Processor = _Processor()
+    started: str | None = None
     finished: str | None = None
     resumed: list["_Provenance"] = []
 
@@ -99,13 +110,26 @@ def read_provenance(path: Path) -> dict[str, Any]:
         UserError: if it cannot be read, or a value is something else.
     """
     fields = read_json(path)
+    check_provenance(fields, path)
+    return fields
+
+
+def check_provenance(fields: Mapping[str, Any], path: Path) -> None:
+    """Refuse what is no provenance.
+
+    Args:
+        fields: what a file says.
+        path: of the file.
+
+    Raises:
+        UserError: if a value is something else.
+    """
     try:
         _Provenance.model_validate(fields)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise UserError(f"'{path}' is damaged: {where}: {first['msg']}") from None
-    return fields
 
 
 def now() -> str:
@@ -118,8 +142,12 @@ def to_json(fields: Mapping[str, Any]) -> str:
     return json.dumps(fields, indent=1) + "\n"
 
 
+@cache
 def _git() -> dict[str, Any] | None:
-    """Commit and whether the work tree differs from it; None outside a checkout."""
+    """Commit and whether the work tree differs from it; None outside a checkout.
+
+    Asked for once in a process, whose code does not change either.
+    """
     folder = Path(__file__).resolve().parent
     try:
         commit, status = (
@@ -138,6 +166,7 @@ def _git() -> dict[str, Any] | None:
     return {"commit": commit, "modified": bool(status)}
 
 
+@cache
 def processor() -> dict[str, Any]:
     """Model name and flags, as far as the system tells."""
     fields: dict[str, Any] = {"machine": platform.machine(), "model": None, "flags": []}

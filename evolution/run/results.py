@@ -4,6 +4,8 @@ import itertools
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import numpy as np
+
 from epuck_mj.host import files
 from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.scene.model import Scene
@@ -46,7 +48,7 @@ def write_results(
     stage: Stage = silent,
     threads: int = 0,
 ) -> Scores:
-    """Choose the champion, test it, and write everything that shows it.
+    """Choose the champion, test it, and write it and, if asked for, what shows it.
 
     Args:
         evolution: a finished run.
@@ -59,7 +61,8 @@ def write_results(
         The champion's scores, as written.
     """
     config = evolution.config
-    stages = 4 + len(judges) * (1 if _met(config) is None else 2)
+    stages = 2 + len(judges) * (1 if _met(config) is None else 2)
+    stages += 2 if directory.drawn else 0
     numbers = itertools.count()
 
     def tell(text: str) -> None:
@@ -68,6 +71,8 @@ def write_results(
     stored = stored_by(evolution)
     controller, scores = judged(evolution, stored, judges, threads, tell)
     files.write_text(directory.champion, controller.to_json())
+    if not directory.drawn:
+        return scores
     tell("Drawing the fitness")
     _draw_fitness(evolution, directory)
     tell("Recording the champion")
@@ -82,6 +87,7 @@ def judged(
     judges: Mapping[str, Judge],
     threads: int = 0,
     tell: Callable[[str], None] = silent,
+    best: tuple[np.ndarray, float] | None = None,
 ) -> tuple[ControllerFile, Scores]:
     """The champion of a run, chosen and tested, and its scores.
 
@@ -91,6 +97,8 @@ def judged(
         judges: by robot, as of `Judges.tested_on`.
         threads: that step the robots; 0 is one per core.
         tell: told what is done next.
+        best: genome `(genes,)` of the individual with the highest stored fitness, and
+            that fitness; None to take it from what was stored.
     """
     config, n = evolution.config, evolution.config.test_starts
     met = _met(config)
@@ -107,7 +115,7 @@ def judged(
             as_evolved[robot] = judge.test(policy, n, met)
     # what the run believed its best to be, and what that is worth where it evolved
     tell("Testing the individual of the highest fitness")
-    genome, believed = most_believed(stored)
+    genome, believed = best or most_believed(stored)
     where = WHEELED_ROBOT if evolution.climbed else Path(config.robot).name
     worth = judges[where].fitness(config.topology, genome, n)
     scores = Scores(

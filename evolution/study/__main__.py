@@ -5,8 +5,8 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -23,7 +23,6 @@ from epuck_mj.host.yaml_and_json import read_json
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
 from epuck_mj.scene.model_files import find_arena, find_robot
 from evolution.judging.scores import KnownScores, read_champion
-from evolution.run.directory import RunDirectory
 from evolution.run.lock import locked
 from evolution.run.means import Means
 from evolution.settings.memory import check_needs
@@ -45,7 +44,8 @@ class Options:
     """Run every experiment of a study with every seed; skip finished runs.
 
     Runs of one seed get the same starts in every experiment. Call it again to continue
-    after Ctrl-C, a crash or a power cut, or to add seeds and experiments.
+    after Ctrl-C, a crash or a power cut, or to add seeds and experiments. Finished runs
+    are rows of champions.parquet and history.parquet.
 
     Attributes:
         study: a shipped study (paper, wheels, transfer, quick) or a YAML file.
@@ -103,14 +103,30 @@ def study(argv: Sequence[str]) -> int:
             check_needs(each)
     directory = StudyDirectory(options.output)
     directory.open(config, seeds)
-    typed = tuple(argv)
+    # arrow is for a command that makes sense
+    from evolution.study.packing import Packer
+
+    # what a process that was killed has finished, and studies of older versions
+    packer = Packer(directory)
+    packer.now()
+    typed, there = tuple(argv), directory.tables.packed()
     # all experiments of a seed before the next: a study cut short is still paired
     everything = [
-        Job(name, config.with_seed(name, seed), directory.run(name, seed).path, typed)
+        Job(
+            name,
+            config.with_seed(name, seed),
+            directory.run(name, seed).path,
+            typed,
+            directory.path,
+        )
         for seed in seeds
         for name in config.experiments
     ]
-    jobs = [job for job in everything if not RunDirectory(job.directory).finished]
+    jobs = [
+        job
+        for job in everything
+        if (job.name, job.config.seed) not in there and not job.run.finished
+    ]
     started = time.monotonic()
     failed: list[Job] = []
     with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:
@@ -121,11 +137,18 @@ def study(argv: Sequence[str]) -> int:
                     _measure_yardstick(directory)
                 except UserError as error:
                     print(f"{YARDSTICK} could not be tested: {error}", file=sys.stderr)
-                events = _shown(everything, jobs, _events(jobs, options))
-                failed.extend(
-                    event.job for event in events if event.failure is not None
-                )
+                with closing(_events(jobs, options)) as events:
+                    for event in _shown(everything, jobs, events):
+                        if event.failure is not None:
+                            failed.append(event.job)
+                        elif event.ended:
+                            packer.when_due()
+                packer.finish()
         except Interrupted:
+            try:
+                packer.now()
+            except UserError as error:
+                print(f"finished runs are in no table yet: {error}", file=sys.stderr)
             again = shell_command(MODULE, *argv)
             print(f"Interrupted; continue with: {again}", file=sys.stderr)
             return interruption.status
@@ -160,19 +183,20 @@ def _measure_yardstick(directory: StudyDirectory) -> None:
         files.write_text(path, text)
 
 
-def _events(jobs: Sequence[Job], options: Options) -> Iterator[Event]:
+def _events(jobs: Sequence[Job], options: Options) -> Generator[Event]:
     """Events of all jobs, from this machine or from a cluster."""
     if options.cluster is not None:
         # an extra
         from evolution.study.cluster import carry_out_on_cluster
 
-        return carry_out_on_cluster(
+        yield from carry_out_on_cluster(
             jobs, options.cluster, options.split, options.racing
         )
+        return
     cores = _cores()
     n_processes = min(options.jobs or cores, max(1, len(jobs)))
     means = Means(threads=max(1, cores // n_processes), racing=options.racing)
-    return carry_out_side_by_side(jobs, means, n_processes)
+    yield from carry_out_side_by_side(jobs, means, n_processes)
 
 
 def _cores() -> int:
@@ -215,7 +239,11 @@ def _shown(
 
 def _line(job: Job) -> str:
     """Line that shows the scores of a finished run."""
-    _, scores = read_champion(RunDirectory(job.directory).champion)
+    path = job.run.champion
+    if not files.is_file(path):
+        # another process has packed it
+        return str(job)
+    _, scores = read_champion(path)
     return f"{job}: {scores.in_short}"
 
 

@@ -1,27 +1,25 @@
-"""Data of a study: its finished runs, read from its directory."""
+"""Data of a study: its finished runs, read from its tables."""
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from epuck_mj.errors import UserError
-from epuck_mj.host import files
-from epuck_mj.host.command_line import shell_command
 from epuck_mj.host.yaml_and_json import read_json
 from epuck_mj.policies.file import ControllerFile
 from epuck_mj.policies.wall_follower import YARDSTICK
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.judging.held_out import tested_on
-from evolution.judging.scores import HeldOut, KnownScores, Scores, read_champion
+from evolution.judging.scores import HeldOut, KnownScores, Scores
 from evolution.run.directory import RunDirectory
-from evolution.run.history import read_history
-from evolution.settings.comparison import differing_keys
 from evolution.settings.config import ExperimentConfig
 from evolution.study.config import seeds_text
 from evolution.study.directory import StudyDirectory
+from evolution.study.packed_run import PackedRun, read_packed
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,10 +28,12 @@ class RunData:
 
     Attributes:
         seed: its seed.
-        history: columns of history.csv by name, `(generations,)` each.
+        history: columns of its history by name, `(generations,)` each, as
+            `histories.History`.
         champion: the champion.
         scores: what it is worth.
-        path: its directory.
+        path: `STUDY/EXPERIMENT/seed-N`, or the directory that it is still in.
+        provenance: of the run, as an entry of provenance.json.
     """
 
     seed: int
@@ -41,6 +41,13 @@ class RunData:
     champion: ControllerFile
     scores: Scores
     path: Path
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def control_steps(self) -> int | None:
+        """Control steps that the run took, None if it did not count them."""
+        steps = self.history.get("control_steps", np.zeros(0))
+        return int(np.nansum(steps)) or None
 
     def held_out(self, robot: str) -> float:
         """The champion's mean on the test starts."""
@@ -123,24 +130,35 @@ def load_study(path: Path) -> StudyData:
     """
     directory = StudyDirectory(path)
     config = directory.stored_config()
+    packed, damaged = directory.tables.sound_runs(config)
     runs: dict[str, tuple[RunData, ...]] = {}
     missing: list[str] = []
     tested: tuple[str, ...] = ()
     asked = directory.asked_seeds()
     for name, experiment in config.experiments.items():
         finished = []
-        for seed in directory.seeds(name):
+        seeds = directory.seeds(name)
+        # those of killed studies, and of older ones
+        places: dict[int, list[RunDirectory]] = {}
+        for seed, place in directory.runs(name):
+            places.setdefault(seed, []).append(place)
+        for seed in seeds:
             try:
-                run = _run(directory.run(name, seed), experiment, seed, tested)
+                if (name, seed) in damaged:
+                    raise damaged[name, seed]
+                run = packed.get((name, seed)) or _unpacked(
+                    places[seed], name, config.with_seed(name, seed)
+                )
+                _check_tests(run, experiment, tested)
                 tested = tuple(run.scores.held_out)
-                finished.append(run)
+                finished.append(_data(run))
             except UserError as error:
                 missing.append(f"{name} seed {seed}: {error}")
         runs[name] = tuple(finished)
-        not_begun = set(asked.get(name, ())) - set(directory.seeds(name))
+        not_begun = set(asked.get(name, ())) - set(seeds)
         if not_begun:
-            seeds = seeds_text(sorted(not_begun))
-            missing.append(f"{name} seeds {seeds}: asked for, not there")
+            text = seeds_text(sorted(not_begun))
+            missing.append(f"{name} seeds {text}: asked for, not there")
         elif not finished:
             missing.append(f"{name}: no finished run")
     everything = [run for each in runs.values() for run in each]
@@ -179,42 +197,45 @@ def load_study(path: Path) -> StudyData:
     )
 
 
-def _run(
-    directory: RunDirectory,
-    config: ExperimentConfig,
-    seed: int,
-    tested: tuple[str, ...],
-) -> RunData:
-    """A finished run; `tested` are the robots that those before were tested on.
+def _unpacked(
+    places: Sequence[RunDirectory], name: str, config: ExperimentConfig
+) -> PackedRun:
+    """A finished run that is not in the tables yet, from the first place that has it.
 
     Raises:
         UserError: if it is not finished, damaged, or of another config.
     """
-    if not directory.marked_finished():
-        raise UserError("not finished")
-    lost = "; ".join(directory.lost())
-    if lost and files.is_file(directory.checkpoint):
-        again = shell_command("evolution.run", "--resume", directory.path)
-        raise UserError(f"incomplete: {lost}; to write it again: {again}")
-    if lost:
-        raise UserError(f"incomplete: {lost}")
-    stored = directory.stored_config()
-    differing = differing_keys(stored, config.model_copy(update={"seed": seed}))
-    if differing:
-        raise UserError(f"of another config: {', '.join(differing)}")
-    champion, scores = read_champion(directory.champion)
-    # the report reads of the config what the champion's file says, too
-    if (champion.task, champion.network) != (config.task, config.topology):
-        raise UserError(f"'{directory.champion}' is of another task or network")
+    finished = [place for place in places if place.finished]
+    return read_packed((finished or places)[0], name, config)
+
+
+def _data(run: PackedRun) -> RunData:
+    return RunData(
+        run.seed, run.history, run.champion, run.scores, run.path, run.provenance
+    )
+
+
+def _check_tests(
+    run: PackedRun, config: ExperimentConfig, tested: tuple[str, ...]
+) -> None:
+    """Refuse a run that was tested on other robots than those before it.
+
+    Args:
+        run: to be checked.
+        config: of its experiment.
+        tested: the robots that those before were tested on.
+
+    Raises:
+        UserError: for such a run.
+    """
+    scores = run.scores
     expected = tested or _tested_on(config, scores)
     for tests in (scores.held_out, scores.held_out_as_evolved):
         if tests and tuple(tests) != expected:
             raise UserError(
-                f"'{directory.champion}': tested on {', '.join(tests)}, expected "
+                f"'{run.path}': tested on {', '.join(tests)}, expected "
                 + ", ".join(expected)
             )
-    history = read_history(directory.history)
-    return RunData(seed, history, champion, scores, directory.path)
 
 
 def _tested_on(config: ExperimentConfig, scores: Scores) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
-"""The study directory: a run directory per experiment and seed, and the config."""
+"""The study directory: its config, its tables, and the runs that are not in these."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
@@ -14,35 +15,24 @@ from evolution.study.config import (
     seeds_to_yaml,
 )
 
+if TYPE_CHECKING:
+    from evolution.study.tables import Tables
+
 PREFIX = "seed-"
+
+RUNNING = "running"
+"""Folder of the runs that are not in the tables yet."""
 
 PATIENCE = 10.0
 """How long to wait for another process that opens the same study [s]."""
 
 
-def runs_at(place: Path) -> list[RunDirectory]:
-    """The run at a path, or all runs of the study there, finished or not."""
-    if not files.is_directory(place):
-        return []
-    run = RunDirectory(place)
-    if run.begun or files.is_file(run.champion):
-        return [run]
-    study = StudyDirectory(place)
-    return [
-        study.run(name, seed)
-        for name in sorted(each.name for each in place.iterdir() if each.is_dir())
-        for seed in study.seeds(name)
-    ]
-
-
-def champions(place: Path) -> list[Path]:
-    """Champion files of the run or of all runs of the study at a path."""
-    found = (run.champion for run in runs_at(place))
-    return [path for path in found if files.is_file(path)]
-
-
 class StudyDirectory:
-    """Directory with `study.yaml` and run directories `<experiment>/seed-<n>/`."""
+    """Directory with `study.yaml`, the tables of finished runs, and `running/`.
+
+    A run is in `running/<experiment>/seed-<n>/` until the tables have it. In older
+    studies, all runs are in `<experiment>/seed-<n>/`.
+    """
 
     def __init__(self, path: Path):
         """Name the directory, without touching it."""
@@ -51,16 +41,33 @@ class StudyDirectory:
         self.asked = path / "seeds.yaml"
         self.yardstick = path / "wall-follower.json"
 
+    @property
+    def tables(self) -> "Tables":
+        """The tables of finished runs, which need not be there."""
+        # arrow is for those who read them
+        from evolution.study.tables import Tables
+
+        return Tables(self.path)
+
     def run(self, name: str, seed: int) -> RunDirectory:
-        """The directory of one run."""
-        return RunDirectory(self.path / name / f"{PREFIX}{seed}")
+        """The directory of one run until it is in the tables."""
+        path = self.path / RUNNING / name / f"{PREFIX}{seed}"
+        return RunDirectory(path, drawn=False)
+
+    def runs(self, name: str) -> Iterator[tuple[int, RunDirectory]]:
+        """Seeds and directories of the runs of an experiment that have one."""
+        for place in (self.path / RUNNING / name, self.path / name):
+            for seed in seeds_in(place):
+                yield seed, RunDirectory(place / f"{PREFIX}{seed}", drawn=False)
 
     def seeds(self, name: str) -> list[int]:
-        """Seeds with a directory, in ascending order."""
-        found = (path.name for path in (self.path / name).glob(f"{PREFIX}*/"))
-        numbers = (part.removeprefix(PREFIX) for part in found)
-        # not seed-01, a copy that a person made: it would count as seed 1 again
-        return sorted(int(n) for n in numbers if n.isdecimal() and str(int(n)) == n)
+        """Seeds with a directory or a row in the tables, in ascending order.
+
+        Raises:
+            UserError: if the tables are damaged.
+        """
+        packed = {seed for each, seed in self.tables.packed() if each == name}
+        return sorted(packed | {seed for seed, _ in self.runs(name)})
 
     def asked_seeds(self) -> dict[str, list[int]]:
         """All seeds asked for so far, by experiment; empty for older studies.
@@ -128,3 +135,11 @@ class StudyDirectory:
                 "python -m evolution.study writes it"
             )
         return StudyConfig.from_yaml(self.config)
+
+
+def seeds_in(place: Path) -> list[int]:
+    """Seeds of the run directories in a folder, in ascending order."""
+    found = (path.name for path in place.glob(f"{PREFIX}*/"))
+    numbers = (part.removeprefix(PREFIX) for part in found)
+    # not seed-01, a copy that a person made: it would count as seed 1 again
+    return sorted(int(n) for n in numbers if n.isdecimal() and str(int(n)) == n)

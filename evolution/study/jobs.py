@@ -13,8 +13,10 @@ import traceback
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.hardship import hardship
@@ -22,6 +24,10 @@ from epuck_mj.host.interruption import deaf_to_interrupts
 from evolution.run.directory import RunDirectory
 from evolution.run.means import Means
 from evolution.settings.config import ExperimentConfig
+from evolution.study.directory import StudyDirectory
+
+if TYPE_CHECKING:
+    from evolution.run.execution import Loaded
 
 PATIENCE = 10.0
 """How long to wait for another process to leave a run's directory [s]."""
@@ -36,16 +42,36 @@ class Job:
         config: what to do, seed included.
         directory: where.
         argv: what the person typed.
+        study: directory of the study, whose tables may have the run; None if that is
+            not on this machine.
     """
 
     name: str
     config: ExperimentConfig
     directory: Path
     argv: tuple[str, ...]
+    study: Path | None = None
 
     def __str__(self) -> str:
         """Its experiment and seed."""
         return f"{self.name} seed {self.config.seed}"
+
+    @property
+    def run(self) -> RunDirectory:
+        """The directory of its run."""
+        return RunDirectory(self.directory, drawn=False)
+
+    @property
+    def packed(self) -> bool:
+        """Whether the tables of the study have the run.
+
+        Raises:
+            UserError: if they are damaged.
+        """
+        if self.study is None:
+            return False
+        tables = StudyDirectory(self.study).tables
+        return (self.name, self.config.seed) in tables.packed()
 
 
 @dataclass(frozen=True)
@@ -65,23 +91,31 @@ class Event:
     failure: str | None = None
 
 
-def carry_out(job: Job, means: Means, report: Callable[[int], None]) -> None:
+def carry_out(
+    job: Job,
+    means: Means,
+    report: Callable[[int], None],
+    loaded: "Loaded | None" = None,
+) -> None:
     """Start a job, or continue it from its directory.
 
     Args:
         job: what to do.
         means: how to do it.
         report: called with the evaluations done, once per generation.
+        loaded: what earlier jobs of this process have loaded.
 
     Raises:
         UserError: for anything the user can put right.
     """
-    with closing(generations(job, means)) as steps:
+    with closing(generations(job, means, loaded)) as steps:
         for evaluations in steps:
             report(evaluations)
 
 
-def generations(job: Job, means: Means) -> Generator[int]:
+def generations(
+    job: Job, means: Means, loaded: "Loaded | None" = None
+) -> Generator[int]:
     """Do a job; yield the number of evaluations done after each generation.
 
     Raises:
@@ -90,15 +124,15 @@ def generations(job: Job, means: Means) -> Generator[int]:
     # MuJoCo is for those who simulate: the study itself does not
     from evolution.run.execution import Run
 
-    directory = RunDirectory(job.directory)
+    directory = job.run
     with directory.locked(PATIENCE):
         begun = directory.begun
         if begun:
             directory.refuse_other_config(job.config)
         # another process may have done it since the jobs were listed
-        if directory.finished:
+        if directory.finished or job.packed:
             return
-        run = Run(job.config, directory, means, job.argv)
+        run = Run(job.config, directory, means, job.argv, loaded)
         if begun:
             run.resume()
         else:
@@ -170,12 +204,15 @@ class _Worker:
 def _work(means: Means, line: Connection) -> None:
     """Main function of a worker: does jobs until its pipe is closed."""
     threading.Thread(target=_die_with_parent, daemon=True).start()
+    loaded = None
     try:
         while True:
             job: Job = line.recv()
             failure = None
             try:
-                carry_out(job, means, lambda done, job=job: line.send(Event(job, done)))
+                loaded = loaded or _nothing_loaded(means)
+                report = partial(_report, line, job)
+                carry_out(job, means, report, loaded)
                 failure_log(job.directory).unlink(missing_ok=True)
             except (BrokenPipeError, ConnectionResetError):
                 raise
@@ -185,6 +222,17 @@ def _work(means: Means, line: Connection) -> None:
     except (EOFError, BrokenPipeError, ConnectionResetError):
         # the parent has gone: what is on disk can be resumed at any moment
         os._exit(1)
+
+
+def _nothing_loaded(means: Means) -> "Loaded":
+    # MuJoCo is for those who simulate
+    from evolution.run.execution import Loaded
+
+    return Loaded(means.threads)
+
+
+def _report(line: Connection, job: Job, done: int) -> None:
+    line.send(Event(job, done))
 
 
 def failure_of(job: Job, error: Exception) -> str:

@@ -15,10 +15,10 @@ import tyro
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import check_threads, main, parse, word
-from epuck_mj.policies.file import CHAMPION
+from epuck_mj.policies.file import CHAMPION, CHAMPIONS
 from evolution.run.directory import RunDirectory
-from evolution.run.provenance import processor
-from evolution.study.directory import runs_at
+from evolution.run.provenance import blas, processor
+from evolution.study.addresses import PlacedRun, runs_at
 from evolution.verify.written import Written, read_run
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ MODULE = "evolution.verify"
 
 EXAMPLES = (
     "python -m evolution.verify runs/ga-seed-1",
-    "python -m evolution.verify results/paper",
+    "python -m evolution.verify results/paper results/wheels/ga/seed-1",
 )
 
 
@@ -41,7 +41,8 @@ class Options:
     status is 1 if anything differs.
 
     Attributes:
-        paths: run directories, or study directories to verify all their runs.
+        paths: run directories, STUDY/EXPERIMENT/seed-N, or study directories to verify
+            all their runs.
         threads: threads that step the robots; 0 is one per core. Changes no result.
     """
 
@@ -74,17 +75,21 @@ def verify(argv: Sequence[str]) -> int:
     return 0 if same == len(runs) else 1
 
 
-def _runs(path: Path) -> list[RunDirectory]:
+def _runs(path: Path) -> list[PlacedRun]:
     """The finished runs at a path.
 
     Raises:
         UserError: if there are none.
     """
-    found = [run for run in runs_at(path) if run.has_results]
+    found = [
+        run
+        for run in runs_at(path, histories=True)
+        if not isinstance(run, RunDirectory) or run.has_results
+    ]
     if not found:
         raise UserError(
-            f"no champion in '{path}': expected the directory of a finished run, or "
-            "of a study with one"
+            f"no champion in '{path}': expected the directory of a finished run, of a "
+            "study with one, or STUDY/EXPERIMENT/seed-N"
         )
     return found
 
@@ -100,7 +105,8 @@ def _verified(written: Written, judges: "Judges", threads: int) -> bool:
         print(f"{path}: {error}", flush=True)
         return False
     lines, unsaid = outcome.differing, ", ".join(outcome.unsaid)
-    silent = f"; {CHAMPION} does not say {unsaid}" if unsaid else ""
+    file = CHAMPIONS if written.packed else CHAMPION
+    silent = f"; {file} does not say {unsaid}" if unsaid else ""
     if not lines:
         print(f"{path}: the same to the last bit{silent}", flush=True)
         return True
@@ -131,6 +137,8 @@ def changes(provenance: Mapping[str, Any]) -> list[str]:
 def _version(package: str) -> str:
     if package == "python":
         return platform.python_version()
+    if package == "blas":
+        return blas()
     try:
         return version(package)
     except PackageNotFoundError:

@@ -15,12 +15,20 @@ from typing import Any
 import numpy as np
 
 from epuck_mj.host.own_parts import is_own
+from epuck_mj.policies.file import CHAMPIONS
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.judging.evaluation import evaluate
 from evolution.judging.held_out import Judge, Judges
 from evolution.run.champion import Stored, stored_by
 from evolution.run.generation_loop import Evolution
-from evolution.run.history import CLIMBED, HISTORY, Record, csv_columns, timing_text
+from evolution.run.history import (
+    CLIMBED,
+    HISTORY,
+    ROBOT,
+    Record,
+    csv_columns,
+    timing_text,
+)
 from evolution.run.results import judged, shown_trials
 from evolution.settings.comparison import flat
 from evolution.verify.differences import lines_of_differences, said, unsaid
@@ -56,9 +64,17 @@ def compared(written: Written, judges: Judges, threads: int) -> Outcome:
     else:
         lines += _histories(written, evolution)
         stored = stored_without_checkpoint(written, evolution)
-    tested = _judges(written, judges)
-    controller, _ = judged(evolution, stored, tested, threads)
+    tested, best = _judges(written, judges), None
+    if written.packed and len(written.best[1]):
+        best = written.best[0][0], float(written.best[1][0])
+    unknown = written.packed and best is None
+    controller, _ = judged(evolution, stored, tested, threads, best=best)
     now, name = json.loads(controller.to_json()), written.run.champion.name
+    name = CHAMPIONS if written.packed else name
+    if unknown:
+        # whose genome is not known: what it says cannot be made again
+        before = written.champion["scores"].get("most_believed", {})
+        now["scores"]["most_believed"] = before
     known = said(now, written.champion)
     lines += lines_of_differences(name, written.champion, known)
     if written.trajectory is not None:
@@ -67,7 +83,9 @@ def compared(written: Written, judges: Judges, threads: int) -> Outcome:
         name, before = written.run.trajectory.name, _arrays(written.trajectory)
         lines += lines_of_differences(name, before, _arrays(shown))
     # the first generations are compared twice
-    return Outcome(tuple(dict.fromkeys(lines)), tuple(unsaid(now, written.champion)))
+    silent = ["most_believed_genome"] if unknown else []
+    silent += unsaid(now, written.champion)
+    return Outcome(tuple(dict.fromkeys(lines)), tuple(silent))
 
 
 def _judges(written: Written, judges: Judges) -> Mapping[str, Judge]:
@@ -111,7 +129,15 @@ def _generations(
     """Lines about the first `n` generations, or all of them."""
     run, records = written.run, evolution.records
     before = {name: values[:n].tolist() for name, values in written.history.items()}
-    yield from lines_of_differences(run.history.name, before, _columns(records))
+    now = _columns(records)
+    if written.packed:
+        # of every generation, the table has numbers only
+        now |= {ROBOT: [_robot(r, evolution) for r in records]}
+        now = {name: now[name] for name in before if name in now}
+        before = {name: before[name] for name in now}
+        yield from lines_of_differences("history.parquet", before, now)
+        return
+    yield from lines_of_differences(run.history.name, before, now)
     genomes, fitness = (array[:n].tolist() for array in written.best)
     yield from lines_of_differences(
         run.best_individuals.name,
@@ -123,7 +149,12 @@ def _generations(
     )
 
 
-def _columns(records: list[Record]) -> dict[str, list[float]]:
+def _robot(record: Record, evolution: Evolution) -> str:
+    """Name of the robot of a generation."""
+    return WHEELED_ROBOT if record.climbed else evolution.scene.name
+
+
+def _columns(records: list[Record]) -> dict[str, list[Any]]:
     """Columns of history.csv."""
     names = [*HISTORY, CLIMBED]
     return {name: [float(getattr(r, name)) for r in records] for name in names}
@@ -133,6 +164,10 @@ def _histories(written: Written, evolution: Evolution) -> Iterator[str]:
     """Lines about the histories of a run without checkpoint."""
     name = written.run.best_individuals.name
     fitness, best = written.best[1].tolist(), written.history["best"].tolist()
+    if written.packed:
+        # the highest, of a run that has climbed since then
+        climbed = written.history[CLIMBED]
+        name, best = CHAMPIONS, [max(best[int(climbed.argmax()) :])][: len(fitness)]
     yield from lines_of_differences(name, {"fitness": fitness}, {"fitness": best})
     spent, config = int(written.history["evaluations"][-1]), evolution.config
     # an own optimiser's generations may differ in size
@@ -141,7 +176,8 @@ def _histories(written: Written, evolution: Evolution) -> Iterator[str]:
     if left < 0 or not (own or left < evolution.optimizer.next_size()):
         yield (
             f"{written.run.config.name}: evaluations {config.evaluations}, but "
-            f"{written.run.history.name} ends with {spent}"
+            f"{'history.parquet' if written.packed else written.run.history.name} ends "
+            f"with {spent}"
         )
 
 
@@ -152,7 +188,9 @@ def stored_without_checkpoint(written: Written, evolution: Evolution) -> Stored:
     first = int(climbed.argmax())
     if climbed.any():
         evolution.climb()
-    genomes, fitness = (array[first:] for array in written.best)
+    genomes, fitness = written.best
+    if not written.packed:
+        genomes, fitness = genomes[first:], fitness[first:]
     genome, believed = written.controller.genome, written.champion["scores"]["stored"]
     if genome.size != genomes.shape[1]:
         nobody = np.empty((0, genomes.shape[1])), np.empty(0)
@@ -162,19 +200,35 @@ def stored_without_checkpoint(written: Written, evolution: Evolution) -> Stored:
     # an own optimiser may store what it likes
     own = is_own(evolution.config.optimizer.algorithm)
     if believed not in as_best and not own:
-        generations = range(first, first + len(fitness))
+        generations = range(first, len(written.history["best"]))
         earned = _earned(evolution, genome, generations)
         if believed not in earned:
             believed = as_best[-1] if as_best.size else earned.max()
-    return Stored(genome[None], np.array([believed]), genomes, fitness)
+    alone = genome[None], np.array([believed])
+    # which others the champion was chosen from, the tables do not say
+    return Stored(*alone, *(alone if written.packed else (genomes, fitness)))
 
 
 def _earned(evolution: Evolution, genome: np.ndarray, generations: range) -> np.ndarray:
-    """What a genome earns on the trials of each generation, `(generations,)`."""
+    """What a genome earns on the trials of each generation, `(n,)`.
+
+    Where individuals have starts of their own, on those of each of them: which one it
+    was is not stored.
+    """
     engine, topology = evolution.engine, evolution.config.topology
+    # offspring, and parents that are evaluated again
+    most = 2 * len(evolution.optimizer.population)
+    individuals = most if evolution.config.own_starts else 1
+    genomes = np.repeat(genome[None], individuals, axis=0)
     each = [
-        evaluate(engine, topology, genome[None], starts, disturbances=met).fitness
-        for starts, met in map(evolution.trials, generations)
+        evaluate(
+            engine,
+            topology,
+            genomes,
+            evolution.starts(generation, individuals),
+            disturbances=evolution.disturbances(generation),
+        ).fitness
+        for generation in generations
     ]
     return np.concatenate(each)
 

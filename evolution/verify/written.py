@@ -1,8 +1,9 @@
-"""What is written in the directory of a run, read before any work is done."""
+"""What is written of a run, read before any work is done."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,15 +15,20 @@ from evolution.judging.scores import read_champion
 from evolution.run.directory import RunDirectory
 from evolution.run.history import csv_columns, read_best_individuals, read_history
 from evolution.settings.config import ExperimentConfig
-from evolution.study.directory import StudyDirectory
+from evolution.study.addresses import PlacedRun
+from evolution.study.directory import RUNNING, StudyDirectory
+
+if TYPE_CHECKING:
+    from evolution.study.packed_run import PackedRun
 
 
 @dataclass(frozen=True, eq=False)
 class Written:
-    """What is written in the directory of a run.
+    """What is written of a run, in its directory or in the tables of a study.
 
     Attributes:
-        run: the directory.
+        run: the directory; of a run in tables, where it would be.
+        packed: whether the run is in tables.
         config: of config.yaml.
         source: the config that the run was made with: of its checkpoint, of the study
             it is in, or else `config`.
@@ -32,12 +38,14 @@ class Written:
         controller: the same, understood.
         history: columns of history.csv by name, `(generations,)` each.
         best: genomes `(generations, genes)` and fitness `(generations,)` of
-            best_individuals.npz.
+            best_individuals.npz; of a run in tables, those of one individual, the one
+            with the highest stored fitness, or of none if it is not known.
         timing: columns of timing.csv, by name.
         trajectory: of trajectory.npz; None if it is not there.
     """
 
     run: RunDirectory
+    packed: bool
     config: ExperimentConfig
     source: ExperimentConfig
     has_checkpoint: bool
@@ -50,7 +58,38 @@ class Written:
     trajectory: Trajectory | None
 
 
-def read_run(run: RunDirectory) -> Written:
+def read_run(run: PlacedRun) -> Written:
+    """What is written of a finished run.
+
+    Raises:
+        UserError: if something is missing or damaged.
+    """
+    return _of_directory(run) if isinstance(run, RunDirectory) else _of_tables(run)
+
+
+def _of_tables(run: "PackedRun") -> Written:
+    """What the tables of a study say of a run."""
+    genome, believed = run.most_believed, run.scores.most_believed
+    best = np.empty((0, run.champion.genome.size)), np.empty(0)
+    if genome is not None and believed is not None:
+        best = genome[None], np.array([believed.stored])
+    return Written(
+        run=RunDirectory(run.path),
+        packed=True,
+        config=run.config,
+        source=run.config,
+        has_checkpoint=False,
+        provenance=run.provenance,
+        champion=json.loads(run.champion.to_json()),
+        controller=run.champion,
+        history=run.history,
+        best=best,
+        timing={},
+        trajectory=None,
+    )
+
+
+def _of_directory(run: RunDirectory) -> Written:
     """What is written in the directory of a finished run.
 
     Raises:
@@ -62,6 +101,7 @@ def read_run(run: RunDirectory) -> Written:
     there = files.is_file(run.trajectory)
     return Written(
         run=run,
+        packed=False,
         config=config,
         source=source,
         has_checkpoint=files.is_file(run.checkpoint),
@@ -84,11 +124,12 @@ def _source(run: RunDirectory, config: ExperimentConfig) -> ExperimentConfig:
     if files.is_file(run.checkpoint):
         return run.checkpoint_config(files.read_arrays(run.checkpoint))
     place = run.path.resolve()
-    study, name = StudyDirectory(place.parent.parent), place.parent.name
+    name, folder = place.parent.name, place.parent.parent
+    study = StudyDirectory(folder.parent if folder.name == RUNNING else folder)
     if not files.is_file(study.config):
         return config
     experiments = study.stored_config()
-    for seed in study.seeds(name):
-        if name in experiments.experiments and study.run(name, seed).path == place:
+    for seed, there in study.runs(name):
+        if name in experiments.experiments and there.path == place:
             return experiments.with_seed(name, seed)
     return config

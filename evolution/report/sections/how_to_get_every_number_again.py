@@ -1,12 +1,10 @@
 """How to get every number again: files, commands, and where the runs came from."""
 
-import shlex
 from typing import Any
 
 from epuck_mj.policies.wall_follower import YARDSTICK
 from evolution.pages.blocks import Block, Code, Heading, Listing, Paragraph, Table
 from evolution.pages.words import NOTHING, command_line, label
-from evolution.run.directory import RunDirectory
 from evolution.settings.comparison import differences
 from evolution.study.data import StudyData
 
@@ -15,7 +13,8 @@ def commands(data: StudyData, output: str, ioh: bool) -> dict[str, str]:
     """What to type to get every number again, by what it gives."""
     study = data.path.as_posix()
     run = next(run for runs in data.runs.values() for run in runs)
-    again = ["--ioh"] if ioh else []
+    name = next(name for name, runs in data.runs.items() if run in runs)
+    config, again = f"again-{name}-{run.seed}.yaml", ["--ioh"] if ioh else []
     return {
         "this report": command_line(
             "evolution.report", study, "--output", output, *again
@@ -27,21 +26,22 @@ def commands(data: StudyData, output: str, ioh: bool) -> dict[str, str]:
             "evolution.verify", study
         ),
         "the hand-written wall follower": command_line("evolution.evaluate", YARDSTICK),
-        "one run, byte for byte (any other likewise)": command_line(
-            "evolution.run",
-            RunDirectory(run.path).config.as_posix(),
-            "--output",
-            f"runs/again-{run.path.parent.name}-{run.seed}",
+        "the config of one run (any other likewise)": command_line(
+            "evolution.export", run.path.as_posix(), config
+        ),
+        "that run, byte for byte": command_line(
+            "evolution.run", config, "--output", f"runs/again-{name}-{run.seed}"
         ),
     }
 
 
 def origins(data: StudyData) -> dict[str, list[Any]]:
     """Commits, versions, processors and arguments of all runs, each once, sorted."""
-    found: dict[str, set[Any]] = {key: set() for key in ORIGINS}
+    found: dict[str, set[Any]] = {key: set() for key in (*ORIGINS, "argv")}
     for runs in data.runs.values():
         for run in runs:
-            fields = RunDirectory(run.path).provenance_fields()
+            fields = run.provenance
+            found["argv"] |= set(fields.get("commands", ()))
             for part in (fields, *fields.get("resumed", ())):
                 for key, read in ORIGINS.items():
                     if part.get(key):
@@ -53,7 +53,6 @@ ORIGINS = {
     "git": lambda git: git["commit"] + (" and changes" if git["modified"] else ""),
     "versions": lambda versions: ", ".join(f"{k} {v}" for k, v in versions.items()),
     "processor": lambda processor: str(processor.get("model")),
-    "argv": lambda argv: shlex.join(argv),
 }
 """Parts of a run's provenance that a report gives, and their texts."""
 

@@ -4,7 +4,12 @@ import numpy as np
 
 from evolution.pages.blocks import Block, Heading, Paragraph, Table
 from evolution.pages.words import NOTHING, label, robot_name, spread
-from evolution.report.samples import like_for_like, most_believed_fitness, with_noise
+from evolution.report.samples import (
+    believed_on,
+    like_for_like,
+    most_believed_fitness,
+    with_noise,
+)
 from evolution.study.data import StudyData
 
 WITH_NOISE = (
@@ -23,7 +28,7 @@ FITNESSES = (
 
 def what_stored_fitness_promised_section(data: StudyData) -> list[Block]:
     """What stored fitness promised and fresh starts did not keep."""
-    robot = data.robots[0]
+    robot = believed_on(data)
     noisy = any(with_noise(data, name) for name in data.with_runs)
     rows = []
     for name, runs in data.with_runs.items():

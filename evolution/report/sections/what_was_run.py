@@ -16,7 +16,6 @@ from evolution.pages.words import (
     spread,
 )
 from evolution.report.measures import shown_robots
-from evolution.report.run_table import control_steps
 from evolution.report.samples import tests_of
 from evolution.run.champion import (
     LATEST_BEST,
@@ -154,7 +153,7 @@ def _spent(data: StudyData, name: str) -> str:
 
 def _steps(data: StudyData, name: str) -> np.ndarray:
     """Control steps of the runs that counted them, `(n,)`."""
-    counted = [control_steps(run) for run in data.runs[name]]
+    counted = [run.control_steps for run in data.runs[name]]
     return np.array([steps for steps in counted if steps], float)
 
 

@@ -63,7 +63,7 @@ def _sent(job: Job, cluster: Cluster, racing: bool) -> Future:
     Raises:
         UserError: if it cannot be begun.
     """
-    directory = RunDirectory(job.directory)
+    directory = job.run
     with directory.locked(PATIENCE):
         _refuse_foreign(directory, job)
         begun = {
@@ -108,7 +108,8 @@ def _run(
         path = Path(folder)
         for name, content in begun.items():
             files.write_bytes(path / name, content)
-        here = replace(job, directory=path)
+        # which has no tables
+        here = replace(job, directory=path, study=None)
         means = Means(threads=worker.state.nthreads, racing=racing)
         try:
             carry_out(here, means, lambda _: _stop_if_unwanted())
@@ -142,7 +143,7 @@ def _keep(job: Job, found: Mapping[str, bytes]) -> None:
     Raises:
         UserError: if they cannot be written.
     """
-    directory = RunDirectory(job.directory)
+    directory = job.run
     first = [directory.config.name, directory.checkpoint.name]
     # after a kill in between the first two can be resumed; the last ends the run
     last = directory.provenance.name
@@ -150,7 +151,7 @@ def _keep(job: Job, found: Mapping[str, bytes]) -> None:
     with directory.locked(PATIENCE), files.writing():
         # another process may have been there meanwhile
         _refuse_foreign(directory, job)
-        if not directory.finished:
+        if not (directory.finished or job.packed):
             files.remove_leftovers(directory.path)
             for name in (*first, *middle, last):
                 files.write_bytes(directory.path / name, found[name])
