@@ -29,6 +29,7 @@ from epuck_mj.host.files import read_arrays
 from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import Policy, TaskParameters
 from tests.bridge_reference import (
@@ -39,7 +40,7 @@ from tests.bridge_reference import (
     same_times,
 )
 
-ROBOTS = ("epuck", "epuck_planar")
+ROBOTS = (WHEELED_ROBOT, KINEMATIC_ROBOT)
 FIRMWARE = "asercom"
 START = (0.1, -0.2, 0.7)
 """Pose: x, y [m], yaw [rad]; nothing is special about it."""

@@ -22,6 +22,7 @@ from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.scene.robot_parts import PREFIX
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import (
@@ -44,10 +45,7 @@ N_STARTS = 200
 REFINEMENT = 5
 """The reference's physics step is this many times smaller than the shipped one."""
 
-STEPS = {
-    "epuck": (1 / 30, 0.025, 0.02, 1 / 60, 0.0125, 0.01, 0.005),
-    "epuck_planar": (0.1, 0.05, 1 / 30, 0.025, 0.02, 0.01),
-}
+STEPS = (1 / 30, 0.025, 0.02, 1 / 60, 0.0125, 0.01, 0.005)
 """Physics steps tried with the shipped contacts and solver [s]."""
 
 _CONE, _SOLVER = mujoco.mjtCone, mujoco.mjtSolver
@@ -69,9 +67,9 @@ class Configuration:
     solver: mujoco.mjtSolver = _SOLVER.mjSOL_NEWTON
     support_gap: float | None = None
 
-    def scene(self, robot: str) -> Scene:
-        """A robot in the square with this configuration."""
-        scene = load_scene(robot, "arena", TASK.control_step, self.timestep)
+    def scene(self) -> Scene:
+        """The robot on wheels in the square with this configuration."""
+        scene = load_scene(WHEELED_ROBOT, "arena", TASK.control_step, self.timestep)
         model = copy.copy(scene.model)
         model.opt.cone, model.opt.solver = self.cone, self.solver
         if self.support_gap is not None:
@@ -90,17 +88,16 @@ class Configuration:
         return f"{1e3 * self.timestep:.1f} ms | {cone} | {solver} | {gap}"
 
 
-def configurations(robot: str, shipped: float) -> list[Configuration]:
+def configurations(shipped: float) -> list[Configuration]:
     """What is compared: all steps, and every other choice at the finer of them."""
-    tried = [Configuration(step) for step in STEPS[robot]]
-    if robot == "epuck":
-        for step in (shipped, 0.0125):
-            tried += [
-                Configuration(step, cone=_CONE.mjCONE_ELLIPTIC),
-                Configuration(step, solver=_SOLVER.mjSOL_CG),
-                Configuration(step, solver=_SOLVER.mjSOL_PGS),
-                Configuration(step, support_gap=0.0),
-            ]
+    tried = [Configuration(step) for step in STEPS]
+    for step in (shipped, 0.0125):
+        tried += [
+            Configuration(step, cone=_CONE.mjCONE_ELLIPTIC),
+            Configuration(step, solver=_SOLVER.mjSOL_CG),
+            Configuration(step, solver=_SOLVER.mjSOL_PGS),
+            Configuration(step, support_gap=0.0),
+        ]
     return tried
 
 
@@ -151,19 +148,18 @@ class Options:
 
 def main(options: Options) -> None:
     """Measure, print and write the table."""
-    text = [HEADER.format(starts=options.starts, margin=MARGIN)]
-    for robot in STEPS:
-        text += ["", f"## {robot}", "", *_table(robot, options.starts)]
+    header = HEADER.format(starts=options.starts, margin=MARGIN)
+    text = [header, "", *_table(options.starts)]
     options.output.write_text("\n".join(text) + "\n")
     print(options.output.read_text())
 
 
-def _table(robot: str, n_starts: int) -> list[str]:
-    scene = load_scene(robot, "arena", TASK.control_step)
+def _table(n_starts: int) -> list[str]:
+    scene = load_scene(WHEELED_ROBOT, "arena", TASK.control_step)
     shipped = scene.model.opt.timestep
     policies, starts = controllers(n_starts), held_out_starts(scene, n_starts)
     finer = Configuration(shipped / REFINEMENT)
-    reference, _ = _measured(finer.scene(robot), policies, starts)
+    reference, _ = _measured(finer.scene(), policies, starts)
     names = " | ".join(reference)
     lines = [
         f"| step | cone | solver | supports | {names} | deviation | cost | passes |",
@@ -171,8 +167,8 @@ def _table(robot: str, n_starts: int) -> list[str]:
         f"| {finer.row()} | {_cells(reference)} | reference | | |",
     ]
     costs, rows = {}, []
-    for configuration in configurations(robot, shipped):
-        fitness, seconds = _measured(configuration.scene(robot), policies, starts)
+    for configuration in configurations(shipped):
+        fitness, seconds = _measured(configuration.scene(), policies, starts)
         costs[configuration] = seconds
         off = deviation(fitness, reference)
         rows.append((configuration, fitness, off))
@@ -207,12 +203,12 @@ def _cells(fitness: Mapping[str, float]) -> str:
 
 HEADER = """# Which physics step is fine enough
 
-Made by `python -m benchmarks.convergence`. Mean fitness of 300 over {starts} starts of
-the hand-written wall follower, of champions of results/paper, and of a fragile
-controller, evolved with a softer drive, that rides 0.4 mm off the wall. The reference
-is the shipped configuration at a fifth of its step. Deviation: the largest of any
-controller; up to {margin:.1%} passes, half of what the tests allow. Cost: CPU time of a
-control step, the shipped one's is 1; differences of a few per cent are noise."""
+Made by `python -m benchmarks.convergence`. Mean fitness of 300 on wheels over {starts}
+starts of the hand-written wall follower, of champions of results/paper, and of a
+fragile controller, evolved with a softer drive, that rides 0.4 mm off the wall. The
+reference is the shipped configuration at a fifth of its step. Deviation: the largest of
+any controller; up to {margin:.1%} passes, half of what the tests allow. Cost: CPU time
+of a control step, the shipped one's is 1; differences of a few per cent are noise."""
 
 if __name__ == "__main__":
     main(tyro.cli(Options))

@@ -29,11 +29,11 @@ from benchmarks.kinematic import circling, measure_kinematic
 from epuck_mj.environments.dm_control import FollowWalls, environment
 from epuck_mj.policies.network import Controller
 from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters
 from evolution.judging.evaluation import BatchEngine, Work
 
-ROBOTS = ("epuck", "epuck_planar")
 N_ROBOTS = 750
 """A generation of DE/best: 150 individuals on 5 starts."""
 
@@ -72,22 +72,21 @@ class Turn:
 def main(options: Options) -> None:
     """Measure, print and write."""
     results = {}
-    for robot in ROBOTS:
-        results[robot] = measure(robot, options.repeats)
+    for robot, measured in (
+        (WHEELED_ROBOT, measure_wheels),
+        (KINEMATIC_ROBOT, measure_kinematic),
+    ):
+        results[robot] = measured(options.repeats)
         print(robot)
         for name, value in results[robot].items():
             print(f"  {name:36} {value:10.4g}")
-    results["epuck_kinematic"] = measure_kinematic(options.repeats)
-    print("epuck_kinematic")
-    for name, value in results["epuck_kinematic"].items():
-        print(f"  {name:36} {value:10.4g}")
     if options.json is not None:
         options.json.write_text(json.dumps(results, indent=1) + "\n")
 
 
-def measure(robot: str, repeats: int) -> dict[str, float]:
-    """Medians of the ratios of interleaved repeats."""
-    scene = load_scene(robot, "arena")
+def measure_wheels(repeats: int) -> dict[str, float]:
+    """Medians of the ratios of interleaved repeats, on wheels in MuJoCo."""
+    scene = load_scene(WHEELED_ROBOT, "arena")
     # small circles: no robot crashes
     task = TaskParameters(steps=100)
     starts = FreeSpace(scene, 0.12).sample(np.random.default_rng(0), N_ROBOTS)

@@ -1,4 +1,4 @@
-"""Shared by all tests: the shipped robots in the paper's arena."""
+"""Shared by all tests: the shipped robot in the paper's arena, in each simulator."""
 
 import os
 import signal
@@ -11,9 +11,9 @@ os.environ["RERUN_STRICT"] = "1"
 import pytest
 
 from epuck_mj.host.interruption import SIGNALS
-from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.rungs.table import RUNGS
 from epuck_mj.scene.model import Scene, load_scene
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 
 # ignored where tests run in the background of a script, and by all that they start
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -46,19 +46,16 @@ def scene(request) -> Scene:
     return load_scene(request.param, "arena")
 
 
-@pytest.fixture(
-    scope="session",
-    params=[name for name, maker in RUNGS.items() if maker is MujocoRobots],
-)
-def mujoco_scene(request) -> Scene:
-    """Each shipped robot that MuJoCo moves, in turn."""
-    return load_scene(request.param, "arena")
+@pytest.fixture(scope="session")
+def wheels() -> Scene:
+    """The shipped robot that MuJoCo moves."""
+    return load_scene(WHEELED_ROBOT, "arena")
 
 
 @pytest.fixture(scope="session")
-def planar() -> Scene:
-    """The cheaper one of the two that MuJoCo moves."""
-    return load_scene("epuck_planar", "arena")
+def kinematic() -> Scene:
+    """The cheap one."""
+    return load_scene(KINEMATIC_ROBOT, "arena")
 
 
 @pytest.fixture

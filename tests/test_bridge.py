@@ -37,10 +37,10 @@ from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.motors import STEP_ANGLE
 from epuck_mj.trials.trajectory import Trajectory
 from tests.processes import PATIENCE, python_process
-from tests.shipped import champion_file
 from tests.test_fake import fake_process, living, wait_for
 
-CHAMPION = champion_file()
+ROOT = Path(__file__).resolve().parent.parent
+CHAMPION = ROOT / "benchmarks" / "controllers" / "fragile.json"
 AT_WALL = (0.44, 0.0, np.pi / 2)
 
 
@@ -141,9 +141,9 @@ def moving(emulator):
 
 
 @pytest.mark.slow
-def test_a_champion_drives_a_robot(planar, port, tmp_path):
+def test_a_champion_drives_a_robot(kinematic, port, tmp_path):
     log = tmp_path / "logs" / "drive.1"
-    with living(port, planar, AT_WALL) as emulator:
+    with living(port, kinematic, AT_WALL) as emulator:
         pose = ["0.44", "0", "90"]
         done = run(
             port.name,
@@ -177,10 +177,10 @@ def test_a_champion_drives_a_robot(planar, port, tmp_path):
 
 
 @pytest.mark.slow
-def test_over_tcp_with_everything_asked_for(planar, tmp_path):
+def test_over_tcp_with_everything_asked_for(kinematic, tmp_path):
     Calibration(track=0.055).save(tmp_path / "robot.yaml")
     endpoint = Tcp(0)
-    with living(endpoint, planar, AT_WALL) as emulator:
+    with living(endpoint, kinematic, AT_WALL) as emulator:
         done = run(
             endpoint.name,
             tmp_path / "log",
@@ -202,8 +202,8 @@ def test_over_tcp_with_everything_asked_for(planar, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_dry_run(planar, port, tmp_path):
-    with living(port, planar, AT_WALL) as emulator:
+def test_a_dry_run(kinematic, port, tmp_path):
+    with living(port, kinematic, AT_WALL) as emulator:
         done = run(port.name, tmp_path / "log", "--seconds", "1", "--dry-run")
         assert (done.returncode, done.stderr) == (0, "")
         assert not any(row[0] or row[2] for row in emulator.body.journal.command)
@@ -217,9 +217,9 @@ def test_a_dry_run(planar, port, tmp_path):
 
 
 @pytest.mark.slow
-def test_over_wifi(planar, tmp_path):
+def test_over_wifi(kinematic, tmp_path):
     endpoint = Tcp(0)
-    with living(endpoint, planar, AT_WALL, "wifi") as emulator:
+    with living(endpoint, kinematic, AT_WALL, "wifi") as emulator:
         name = endpoint.name.replace("socket:", "tcp:")
         arguments = ("--seconds", "1", "--calibrate")
         done = run(name, tmp_path / "log", *arguments, how=by_itself)
@@ -235,9 +235,9 @@ def test_over_wifi(planar, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ["stall@1.2", "disconnect@1.2+0.5", "gone@1.2"])
-def test_faults_over_wifi(planar, tmp_path, fault):
+def test_faults_over_wifi(kinematic, tmp_path, fault):
     endpoint = Tcp(0)
-    with living(endpoint, planar, AT_WALL, "wifi", fault) as emulator:
+    with living(endpoint, kinematic, AT_WALL, "wifi", fault) as emulator:
         name = endpoint.name.replace("socket:", "tcp:")
         done = run(name, tmp_path / "log", disturbed=True)
         assert emulator.body.standing == (fault != "gone@1.2")
@@ -253,10 +253,10 @@ def test_faults_over_wifi(planar, tmp_path, fault):
 
 
 @pytest.mark.slow
-def test_a_signal_to_a_process(planar, port, tmp_path):
+def test_a_signal_to_a_process(kinematic, port, tmp_path):
     """And another one; see also test_a_busy_port."""
     with (
-        living(port, planar) as emulator,
+        living(port, kinematic) as emulator,
         started(port.name, tmp_path / "log") as process,
     ):
         moving(emulator)
@@ -277,8 +277,8 @@ def test_a_signal_to_a_process(planar, port, tmp_path):
     "signum",
     [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP],
 )
-def test_signals(planar, port, tmp_path, signum, at_each_line, monkeypatch):
-    with living(port, planar, AT_WALL) as emulator:
+def test_signals(kinematic, port, tmp_path, signum, at_each_line, monkeypatch):
+    with living(port, kinematic, AT_WALL) as emulator:
 
         def interrupted():
             assert not emulator.body.standing
@@ -300,11 +300,11 @@ def test_signals(planar, port, tmp_path, signum, at_each_line, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_operators_key(planar, port, tmp_path, at_each_line, monkeypatch):
+def test_the_operators_key(kinematic, port, tmp_path, at_each_line, monkeypatch):
     master, slave = pty.openpty()
     try:
         with (
-            living(port, planar, AT_WALL) as emulator,
+            living(port, kinematic, AT_WALL) as emulator,
             os.fdopen(slave, closefd=False) as keys,
         ):
 
@@ -325,9 +325,9 @@ def test_the_operators_key(planar, port, tmp_path, at_each_line, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_reader_that_went_away(planar, port, tmp_path):
+def test_a_reader_that_went_away(kinematic, port, tmp_path):
     with (
-        living(port, planar) as emulator,
+        living(port, kinematic) as emulator,
         started(port.name, tmp_path / "log") as process,
     ):
         moving(emulator)
@@ -352,9 +352,9 @@ def test_a_reader_that_went_away(planar, port, tmp_path):
         ("garbage@1,garbage@1.5", None, ""),
     ],
 )
-def test_faults(planar, port, tmp_path, faults, status, cause):
+def test_faults(kinematic, port, tmp_path, faults, status, cause):
     arguments = ("--seconds", "2") if status is None else ()
-    with living(port, planar, AT_WALL, faults=faults) as emulator:
+    with living(port, kinematic, AT_WALL, faults=faults) as emulator:
         done = run(port.name, tmp_path / "log", *arguments, disturbed=True)
         assert emulator.body.standing == (status != 4)
     assert done.returncode in ((0, 3) if status is None else (status,))
@@ -369,7 +369,7 @@ def test_faults(planar, port, tmp_path, faults, status, cause):
 
 @pytest.mark.slow
 def test_a_robot_that_dies(tmp_path, at_each_line):
-    with fake_process("--robot", "epuck_planar", "--tcp", "0") as (robot, name):
+    with fake_process("--tcp", "0") as (robot, name):
         at_each_line(robot.kill)
         done = run(name, tmp_path / "log", disturbed=True)
     assert done.returncode == 4
@@ -382,11 +382,11 @@ def test_a_robot_that_dies(tmp_path, at_each_line):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["pty", "tcp", "wifi"])
-def test_a_bridge_that_is_killed(planar, tmp_path, kind):
+def test_a_bridge_that_is_killed(kinematic, tmp_path, kind):
     """`kill -9` too: its guardian stops the robot, and lets go of the port."""
     endpoint = Pty(tmp_path / "e-puck") if kind == "pty" else Tcp(0)
     robot = "wifi" if kind == "wifi" else "asercom"
-    with living(endpoint, planar, robot=robot) as emulator:
+    with living(endpoint, kinematic, robot=robot) as emulator:
         name = endpoint.name
         if kind == "wifi":
             name = name.replace("socket:", "tcp:")
@@ -406,8 +406,8 @@ def test_a_bridge_that_is_killed(planar, tmp_path, kind):
 
 
 @pytest.mark.slow
-def test_the_next_bridge_stops_a_robot_first(planar, port, tmp_path):
-    with living(port, planar) as emulator:
+def test_the_next_bridge_stops_a_robot_first(kinematic, port, tmp_path):
+    with living(port, kinematic) as emulator:
         emulator.body.drive(Wheel(500.0, 0.0), Wheel(500.0, 0.0))
         done = run(port.name, tmp_path / "log", "--seconds", "0.1", "--dry-run")
         assert done.returncode == 0
@@ -486,9 +486,9 @@ def test_a_device_that_is_no_robot(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_busy_port(planar, port, tmp_path):
+def test_a_busy_port(kinematic, port, tmp_path):
     with (
-        living(port, planar) as emulator,
+        living(port, kinematic) as emulator,
         started(port.name, tmp_path / "log", "--seconds", "600") as first,
     ):
         moving(emulator)

@@ -42,6 +42,7 @@ from epuck_mj.constants import (
 )
 from epuck_mj.errors import UserError
 from epuck_mj.rungs.disturbed import DisturbedRobots
+from epuck_mj.rungs.kinematic.robots import KinematicRobots
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import MODELS
@@ -55,7 +56,9 @@ from tests.test_fake import behind, living, wait_for
 from tests.virtual_time import VirtualPort, VirtualTime
 
 GAINS = np.array([0.62, 1.45, 0.9, 1.1, 0.75, 1.3, 1.0, 1.2])
-RADII = (0.01995, 0.02025)
+RADII, OWN_TRACK = (0.01995, 0.02025), 0.0562
+"""Of the wheels of a robot that is not as shipped [m]."""
+
 CENTRE = (0.0, 0.0, 0.0)
 WALL = 0.5
 DISTANCES = np.array(CLEARANCES)
@@ -187,23 +190,31 @@ def test_wheels_that_no_robot_has():
         fit_track(323, WHEEL_RADIUS, -1.0)
 
 
-@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
-def test_rays_are_shortest_where_a_wall_is_faced(robot):
-    scene = load_scene(robot, "arena")
-    data = mujoco.MjData(scene.model)
+def test_rays_are_shortest_where_a_wall_is_faced(wheels):
+    data = mujoco.MjData(wheels.model)
     x = WALL - BODY_RADIUS - 0.02
     for yaw_wanted, number in zip(-np.radians(PROXIMITY_ANGLES), range(8), strict=True):
         distances = []
         for yaw in yaw_wanted + np.radians([-3, 0, 3]):
-            data.qpos[:] = scene.qpos(np.array([x, 0.0, yaw]))
-            mujoco.mj_forward(scene.model, data)
-            distances.append(scene.reading(data.sensordata).distance[number])
+            data.qpos[:] = wheels.qpos(np.array([x, 0.0, yaw]))
+            mujoco.mj_forward(wheels.model, data)
+            distances.append(wheels.reading(data.sensordata).distance[number])
         assert distances[1] == pytest.approx(0.02, abs=1e-5)
         assert 0 < distances[0] - distances[1] < 1e-4
         assert 0 < distances[2] - distances[1] < 1e-4
 
 
 # whole calibrations
+
+
+class OwnWheels(KinematicRobots):
+    """Kinematic robots with wheels of their own: told what moves shipped ones alike."""
+
+    def step(self, command):
+        left, right = (command * RADII).T
+        ahead, aside = (left + right) / 2, (right - left) / OWN_TRACK * TRACK / 2
+        shipped = np.stack([ahead - aside, ahead + aside], axis=-1)
+        return super().step(shipped / WHEEL_RADIUS)
 
 
 class Body(SimulatedBody):
@@ -213,10 +224,13 @@ class Body(SimulatedBody):
     offset = 0
     noise = 0.0
 
-    def __init__(self, scene, start, now):
+    def __init__(self, scene, start, now, own_wheels=False):
         self.lock = threading.Lock()
         self.rng = np.random.default_rng(0)
         super().__init__(scene, start, now)
+        if own_wheels:
+            self._robots = OwnWheels(dataclasses.replace(scene, n_substeps=1), 1)
+            self._robots.reset(start[None])
 
     def advance(self, now):
         with self.lock:
@@ -284,9 +298,17 @@ class Person:
 class World:
     """A fake robot and a person in virtual time."""
 
-    def __init__(self, scene, gains=None, faults="", robot="asercom", latency=0.0):
+    def __init__(
+        self,
+        scene,
+        gains=None,
+        faults="",
+        robot="asercom",
+        latency=0.0,
+        own_wheels=False,
+    ):
         self.time, self.wifi = VirtualTime(), robot == "wifi"
-        self.body = Body(scene, np.zeros(3), 0.0)
+        self.body = Body(scene, np.zeros(3), 0.0, own_wheels)
         if gains is not None:
             self.body.gains = gains
         self.time.carry(Emulator(self.body, robot, 0.0, scenario(faults), latency))
@@ -311,14 +333,23 @@ class World:
             self.time.sleep(0.1)
 
 
-def changed_robot(folder, radii, track):
-    """The planar robot with other wheels, in its arena."""
-    text = (MODELS / "epuck_planar.xml").read_text()
-    for side, radius in zip((-1, 1), radii, strict=True):
-        gear = f"{1 / WHEEL_RADIUS:.7f} 0 0 0 0 {side * TRACK / 2 / WHEEL_RADIUS:.7f}"
-        assert text.count(gear) == 1
-        own = f"{1 / radius} 0 0 0 0 {side * track / 2 / radius}"
-        text = text.replace(gear, own)
+def changed_robot(folder):
+    """The robot in MuJoCo with wheels of its own, in the square."""
+    text = (MODELS / "epuck.xml").read_text()
+    for name, side, radius in zip(("left", "right"), (1, -1), RADII, strict=True):
+        for shipped, own in (
+            (
+                f'pos="0 {side * TRACK / 2:g} {WHEEL_RADIUS:g}"',
+                f'pos="0 {side * OWN_TRACK / 2} {radius}"',
+            ),
+            (
+                f'<geom name="wheel_{name}" class="epuck/wheel"',
+                f'<geom name="wheel_{name}" class="epuck/wheel" '
+                f'size="{radius} 0.0015 {radius}"',
+            ),
+        ):
+            assert text.count(shipped) == 1
+            text = text.replace(shipped, own)
     path = folder / "other.xml"
     path.write_text(text)
     return load_scene(str(path), "arena")
@@ -330,13 +361,13 @@ def output(tmp_path):
 
 
 @pytest.mark.parametrize("robot", ["asercom", "wifi"])
-def test_another_robot(tmp_path, output, robot, capsys):
-    world = World(changed_robot(tmp_path, RADII, 0.0562), GAINS, robot=robot)
+def test_another_robot(kinematic, output, robot, capsys):
+    world = World(kinematic, GAINS, robot=robot, own_wheels=True)
     world.body.offset, world.body.noise = 60, 1.0
     assert world.calibrate(output) == 0
     found = Calibration.load(output)
     assert found.wheel_radii == pytest.approx(RADII, rel=0.002)
-    assert found.track == pytest.approx(0.0562, rel=0.002)
+    assert found.track == pytest.approx(OWN_TRACK, rel=0.002)
     # on wheels that differ, the axle's middle circles while the robot turns
     np.testing.assert_allclose(found.gains, GAINS, rtol=0.04)
     assert world.body.standing
@@ -351,17 +382,16 @@ def test_another_robot(tmp_path, output, robot, capsys):
     ("robot", "latency", "steps"),
     [("btcom", 0.03, ("sensors",)), ("epuck2", 0.01, ("straight", "turn"))],
 )
-def test_other_firmware_on_a_slow_line(tmp_path, output, robot, latency, steps):
+def test_other_firmware_on_a_slow_line(kinematic, output, robot, latency, steps):
     """They set their zero in ways of their own; what they count is the same."""
-    scene = changed_robot(tmp_path, RADII, 0.0562)
-    world = World(scene, GAINS, robot=robot, latency=latency)
+    world = World(kinematic, GAINS, robot=robot, latency=latency, own_wheels=True)
     world.body.offset, world.body.noise = 60, 1.0
     if "straight" not in steps:
-        Calibration(wheel_radii=RADII, track=0.0562).save(output)
+        Calibration(wheel_radii=RADII, track=OWN_TRACK).save(output)
     assert world.calibrate(output, *steps) == 0
     found = Calibration.load(output)
     assert found.wheel_radii == pytest.approx(RADII, rel=0.002)
-    assert found.track == pytest.approx(0.0562, rel=0.002)
+    assert found.track == pytest.approx(OWN_TRACK, rel=0.002)
     if "sensors" in steps:
         np.testing.assert_allclose(found.gains, GAINS, rtol=0.04)
     assert world.body.standing
@@ -377,8 +407,8 @@ def test_a_robot_on_wheels(output):
     np.testing.assert_allclose(found.gains, GAINS, rtol=0.03)
 
 
-def test_a_weak_sensor_is_no_reason_to_stop(planar, output, capsys):
-    world = World(planar)
+def test_a_weak_sensor_is_no_reason_to_stop(kinematic, output, capsys):
+    world = World(kinematic)
     moved = iter([0.02, 0.02, 0.02])
     world.person.changes = {
         "mm of air": [lambda: world.person.at_wall(next(moved))] * 3
@@ -387,10 +417,10 @@ def test_a_weak_sensor_is_no_reason_to_stop(planar, output, capsys):
     assert capsys.readouterr().out.count("warning: ps") == N_PROXIMITY
 
 
-def test_one_step_keeps_what_the_others_found(planar, output):
+def test_one_step_keeps_what_the_others_found(kinematic, output):
     before = Calibration(tuple(GAINS.tolist()), (0.0203, 0.0203), 0.0555)
     before.save(output)
-    assert World(planar).calibrate(output, "turn") == 0
+    assert World(kinematic).calibrate(output, "turn") == 0
     found = Calibration.load(output)
     assert found.track == pytest.approx(TRACK * 0.0203 / WHEEL_RADIUS, rel=0.002)
     assert dataclasses.replace(found, track=0.0555) == before
@@ -399,8 +429,8 @@ def test_one_step_keeps_what_the_others_found(planar, output):
 # answers
 
 
-def test_bad_answers_are_asked_again(planar, output, capsys):
-    world = World(planar)
+def test_bad_answers_are_asked_again(kinematic, output, capsys):
+    world = World(kinematic)
     # a comma is as good as a point
     answers = ["", "half a metre", "51.5", "nan", "-0.5", "0,515"]
     world.person.changes = {"metres": [lambda: answers.pop(0)] * len(answers)}
@@ -420,14 +450,14 @@ def test_bad_answers_are_asked_again(planar, output, capsys):
     ("steps", "part", "answer", "message"),
     [
         (("straight",), "metres", "1.5", "the left wheel from 15 to 25 mm, measured"),
-        (("turn",), "above 0", "-300", "a track from 45 to 65 mm, measured 76.3 mm"),
+        (("turn",), "above 0", "-300", "a track from 45 to 65 mm, measured 76.2 mm"),
         (("sensors",), "[y/n]", "n", "got 60 of ps0: the zero is not set"),
     ],
 )
-def test_what_no_robot_has_is_refused(planar, output, steps, part, answer, message):
+def test_what_no_robot_has_is_refused(kinematic, output, steps, part, answer, message):
     Calibration(track=0.055, wheel_radii=(0.0204, 0.0203)).save(output)
     before = output.read_bytes()
-    world = World(planar)
+    world = World(kinematic)
     world.body.offset = 60
     world.person.changes = {part: [lambda: answer]}
     with pytest.raises(UserError, match=message) as caught:
@@ -450,8 +480,8 @@ def end_of_input():
         (("turn", "sensors"), "mm of air"),
     ],
 )
-def test_the_end_of_the_input(planar, output, steps, part):
-    world = World(planar)
+def test_the_end_of_the_input(kinematic, output, steps, part):
+    world = World(kinematic)
     world.person.changes = {part: [end_of_input]}
     with pytest.raises(UserError, match="got the end of the input") as caught:
         world.calibrate(output, *steps)
@@ -474,8 +504,8 @@ def test_the_end_of_the_input(planar, output, steps, part):
         ("gone@4", 4, "THE MOTORS MAY STILL TURN, switch the robot off"),
     ],
 )
-def test_faults(planar, output, capsys, step, faults, status, message):
-    world = World(planar, faults=faults)
+def test_faults(kinematic, output, capsys, step, faults, status, message):
+    world = World(kinematic, faults=faults)
     world.person.changes = {"[y/n]": [lambda: "n"]}
     assert world.calibrate(output, step) == status
     error = capsys.readouterr().err
@@ -485,16 +515,16 @@ def test_faults(planar, output, capsys, step, faults, status, message):
     assert not output.exists()
 
 
-def test_a_robot_that_stalls_its_motors(planar, output, capsys, monkeypatch):
-    world = World(planar)
+def test_a_robot_that_stalls_its_motors(kinematic, output, capsys, monkeypatch):
+    world = World(kinematic)
     monkeypatch.setattr(world.body, "steps", lambda: (0, 0))
     assert world.calibrate(output, "straight") == 3
     assert "expected 4000 steps in 32 s; came 0" in capsys.readouterr().err
     assert world.body.standing
 
 
-def test_a_signal_while_it_drives(planar, output, capsys, handlers, monkeypatch):
-    world = World(planar)
+def test_a_signal_while_it_drives(kinematic, output, capsys, handlers, monkeypatch):
+    world = World(kinematic)
     sleep = world.time.sleep
 
     def interrupted(duration):
@@ -509,8 +539,8 @@ def test_a_signal_while_it_drives(planar, output, capsys, handlers, monkeypatch)
     assert not output.exists()
 
 
-def test_a_signal_at_a_question(planar, output, handlers):
-    world = World(planar)
+def test_a_signal_at_a_question(kinematic, output, handlers):
+    world = World(kinematic)
     world.person.changes = {"before": [lambda: signal.raise_signal(signal.SIGTERM)]}
     assert world.calibrate(output) == 128 + signal.SIGTERM
 
@@ -563,7 +593,7 @@ def clock():
 @contextmanager
 def own_robot(endpoint, scene):
     """A robot of its own behind an endpoint, faster than real."""
-    body = Body(scene, np.zeros(3), clock())
+    body = Body(scene, np.zeros(3), clock(), own_wheels=True)
     body.gains, body.offset = GAINS, 40
     with behind(endpoint, Emulator(body, "asercom", clock()), clock):
         yield body
@@ -590,10 +620,9 @@ def answered(process, person):
 
 
 @pytest.mark.slow
-def test_the_whole_command(tmp_path, output):
-    scene = changed_robot(tmp_path, RADII, 0.0562)
+def test_the_whole_command(kinematic, tmp_path, output):
     port = Pty(tmp_path / "e-puck")
-    with own_robot(port, scene) as body:
+    with own_robot(port, kinematic) as body:
         # a machine so busy that the watchdog saw it gets more chances
         for chance in (3, 2, 1):
             person = Person(body, lambda: time.sleep(0.1), turns=1)
@@ -607,17 +636,17 @@ def test_the_whole_command(tmp_path, output):
                 break
     found = Calibration.load(output)
     assert found.wheel_radii == pytest.approx(RADII, rel=0.005)
-    assert found.track == pytest.approx(0.0562, rel=0.01)
+    assert found.track == pytest.approx(OWN_TRACK, rel=0.01)
     # turns of a busy machine have fewer readings; see test_another_robot
     np.testing.assert_allclose(found.gains, GAINS, rtol=0.1)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
-def test_signals(planar, tmp_path, output, signum):
+def test_signals(kinematic, tmp_path, output, signum):
     port = Pty(tmp_path / "e-puck")
     with (
-        living(port, planar) as emulator,
+        living(port, kinematic) as emulator,
         started(port.name, output) as process,
     ):
         assert process.stdin is not None
@@ -634,12 +663,12 @@ def test_signals(planar, tmp_path, output, signum):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGHUP])
-def test_signals_at_a_terminals_question(planar, tmp_path, output, signum):
+def test_signals_at_a_terminals_question(kinematic, tmp_path, output, signum):
     master, slave = pty.openpty()
     port = Pty(tmp_path / "e-puck")
     try:
         with (
-            living(port, planar),
+            living(port, kinematic),
             started(port.name, output, stdin=slave) as process,
         ):
             assert process.stdout is not None
@@ -656,10 +685,10 @@ def test_signals_at_a_terminals_question(planar, tmp_path, output, signum):
 
 
 @pytest.mark.slow
-def test_nobody_answers(planar, tmp_path, output):
+def test_nobody_answers(kinematic, tmp_path, output):
     port = Pty(tmp_path / "e-puck")
     with (
-        living(port, planar),
+        living(port, kinematic),
         started(port.name, output) as process,
     ):
         _, error = process.communicate("", timeout=PATIENCE)
@@ -685,14 +714,14 @@ def test_without_a_robot_nobody_is_asked_anything(output):
 # what the file is for
 
 
-def test_a_calibrated_robot_in_simulation(tmp_path, planar):
+def test_a_calibrated_robot_in_simulation(tmp_path, wheels):
     """It drives as the robot does whose wheels these really are."""
-    calibration = Calibration(tuple(GAINS), RADII, 0.0562)
+    calibration = Calibration(tuple(GAINS), RADII, OWN_TRACK)
     quiet = Noise(counts=0.0, wheels=0.0, age=0.0)
     rng = np.random.default_rng(0)
     disturbances = draw_calibrated(calibration, rng, 2, 20, quiet)
-    robots = DisturbedRobots(MujocoRobots(planar, 2, 1), disturbances, 0.1)
-    other = MujocoRobots(changed_robot(tmp_path, RADII, 0.0562), 2, 1)
+    robots = DisturbedRobots(MujocoRobots(wheels, 2, 1), disturbances, 0.1)
+    other = MujocoRobots(changed_robot(tmp_path), 2, 1)
     starts = np.array([[0.3, 0.0, 1.0], [0.44, 0.1, 1.5]])
     reading, truth = robots.reset(starts), other.reset(starts)
     command = np.tile(np.array([200, 250]) * STEP_ANGLE, (2, 1))

@@ -4,6 +4,7 @@ import math
 import statistics
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -380,7 +381,8 @@ def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
         ("epuck", ROUND_WALL, ["epuck", "epuck_kinematic"]),
         # a leaning cylinder has no exact outline
         ("epuck", LEANING_WALL, ["epuck"]),
-        ("epuck_planar", ROUND_WALL, ["epuck_planar", "epuck"]),
+        ("epuck_kinematic", ROUND_WALL, ["epuck", "epuck_kinematic"]),
+        ("own.xml", ROUND_WALL, ["own.xml", "epuck"]),
     ],
 )
 def test_a_run_is_tested_on_wheels_and_on_one_robot_more_that_can_be(
@@ -389,6 +391,8 @@ def test_a_run_is_tested_on_wheels_and_on_one_robot_more_that_can_be(
     draw_nothing(monkeypatch)
     path = tmp_path / "mine.xml"
     path.write_text((MODELS / "arena.xml").read_text().replace("</worldbody>", arena))
+    monkeypatch.chdir(tmp_path)
+    Path("own.xml").write_text((MODELS / "epuck.xml").read_text())
     settings = {"robot": robot, "arena": str(path), "steps": 10, "evaluations": 20}
     experiment = Evolution(tiny("ga", **settings))
     list(experiment.run())

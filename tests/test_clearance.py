@@ -79,7 +79,7 @@ def test_of_a_box_that_is_turned(tmp_path, degrees):
     local = (at[:, :2] - [0.1, 0.2]) @ turn
     nearest = to_box(local, 0.2, 0.05)
     outside = (np.abs(local) > [0.2, 0.05]).any(axis=1)
-    probe = ClearanceProbe(load_scene("epuck_planar", path))
+    probe = ClearanceProbe(load_scene("epuck", path))
     check(probe, at[outside], (nearest @ turn.T + [0.1, 0.2])[outside])
 
 
@@ -102,7 +102,7 @@ def test_of_a_mesh_that_is_moved_scaled_and_turned(tmp_path):
         '<body pos="0.1 0.1 0" euler="0 0 90">'
         '<geom type="mesh" mesh="block" pos="-0.1 -0.05 0"/></body>'
     )
-    scene = load_scene("epuck_planar", arena(tmp_path, body, assets=mesh))
+    scene = load_scene("epuck", arena(tmp_path, body, assets=mesh))
     at = poses(3000, 0.6)
     local = at[:, :2] - [0.1, 0.1]
     outside = (np.abs(local) > [0.05, 0.1]).any(axis=1)
@@ -114,9 +114,7 @@ def test_only_walls_count(tmp_path):
     """What the shell cannot touch is no wall."""
     ghost = '<geom type="box" size="0.1 0.1 0.1" contype="4" conaffinity="4"/>'
     wall = '<geom type="box" pos="1 0 0.03" size="0.01 1 0.03"/>'
-    probe = ClearanceProbe(
-        load_scene("epuck_planar", arena(tmp_path, ghost, wall)), threads=1
-    )
+    probe = ClearanceProbe(load_scene("epuck", arena(tmp_path, ghost, wall)), threads=1)
     got = probe.measure(np.array([[0.0, 0, 0], [0.9, 0, 0]]))
     np.testing.assert_allclose(got.distance, [CLEARANCE_MAX, 0.055], atol=ACCURACY)
 
@@ -147,7 +145,7 @@ def test_walls_without_an_exact_distance_are_refused(tmp_path):
     )
     path = arena(tmp_path, '<geom type="hfield" hfield="hills"/>', assets=heights)
     with pytest.raises(UserError, match="a wall that is a hfield"):
-        ClearanceProbe(load_scene("epuck_planar", path))
+        ClearanceProbe(load_scene("epuck", path))
 
 
 def test_of_many_walls_those_near_are_enough(tmp_path, monkeypatch):
@@ -163,9 +161,7 @@ def test_of_many_walls_those_near_are_enough(tmp_path, monkeypatch):
         for i, (x, y) in enumerate(rng.uniform(-1, 1, (60, 2)))
     )
     geoms += '<geom type="plane" size="1 1 1" pos="-1 0 0" zaxis="1 0 0"/>'
-    path = tmp_path / "arena.xml"
-    path.write_text(f"<mujoco><worldbody>{geoms}</worldbody></mujoco>")
-    scene = load_scene("epuck_planar", str(path))
+    scene = load_scene("epuck", arena(tmp_path, geoms))
     poses = np.append(rng.uniform(-1.4, 1.4, (400, 3)), [[9, 9, 0]], axis=0)
     some = ClearanceProbe(scene, 1).measure(poses)
     monkeypatch.setattr("epuck_mj.scene.clearance.WALLS_MAX", 100)

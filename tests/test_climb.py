@@ -116,7 +116,6 @@ def test_the_population_is_evaluated_anew_and_paid_for(name):
     [
         ({"climb": 1.0}, {"epuck_kinematic"}),
         ({"robot": "epuck"}, {"epuck"}),
-        ({"robot": "epuck_planar"}, {"epuck_planar"}),
         # nothing is left for a climb
         ({"climb": 0.95}, {"epuck_kinematic"}),
     ],

@@ -1,4 +1,4 @@
-"""The shipped physics steps are fine enough, and the plane stands for the floor."""
+"""The shipped physics step is fine enough, and rolling stands for wheels on a floor."""
 
 from dataclasses import replace
 
@@ -16,6 +16,7 @@ from benchmarks.convergence import (
     held_out_starts,
     mean_fitness,
 )
+from epuck_mj.rungs.table import RUNGS
 from epuck_mj.scene.model import load_scene
 from epuck_mj.step.control import BatchPolicy
 
@@ -29,7 +30,7 @@ CHOSEN = ("by hand", "de-best-seed-1", "fragile")
 """The slowest to notice a coarse step, one that evolved, and the quickest."""
 
 KEPT = 0.95
-"""Share of its planar fitness that a controller keeps on wheels."""
+"""Share of its kinematic fitness that a controller keeps on wheels."""
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -53,40 +54,37 @@ def fitness() -> dict[str, dict[str, float]]:
             chosen(),
             held_out_starts(load_scene(robot, "arena"), N_STARTS),
         )
-        for robot in ("epuck", "epuck_planar")
+        for robot in RUNGS
     }
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
-def test_a_fifth_of_the_step_gives_the_same_fitness(robot, fitness):
-    scene = load_scene(robot, "arena")
-    finer = Configuration(scene.model.opt.timestep / REFINEMENT).scene(robot)
-    assert finer.n_substeps == REFINEMENT * scene.n_substeps
-    starts = held_out_starts(scene, N_STARTS)
+def test_a_fifth_of_the_step_gives_the_same_fitness(wheels, fitness):
+    finer = Configuration(wheels.model.opt.timestep / REFINEMENT).scene()
+    assert finer.n_substeps == REFINEMENT * wheels.n_substeps
+    starts = held_out_starts(wheels, N_STARTS)
     reference = mean_fitness(finer, chosen(), starts)
-    assert deviation(fitness[robot], reference) <= TOLERANCE
+    assert deviation(fitness["epuck"], reference) <= TOLERANCE
 
 
 @pytest.mark.slow
-def test_wheels_keep_what_the_plane_gives(fitness):
-    for name, planar in fitness["epuck_planar"].items():
-        assert fitness["epuck"][name] >= KEPT * planar, name
+def test_wheels_keep_what_rolling_gives(fitness):
+    for name, rolling in fitness["epuck_kinematic"].items():
+        assert fitness["epuck"][name] >= KEPT * rolling, name
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("step", [1 / 30, 1 / 50])
 def test_a_coarse_step_is_told_apart(step, fitness):
     """The check can fail: at 20 ms the wheeled robot ruins a good controller."""
-    coarse = Configuration(step).scene("epuck")
+    coarse = Configuration(step).scene()
     starts = held_out_starts(coarse, N_STARTS)
     spoilt = mean_fitness(coarse, chosen(), starts)
     assert deviation(spoilt, fitness["epuck"]) > 2 * TOLERANCE
 
 
 def test_every_configuration_can_be_made():
-    for robot in convergence.STEPS:
-        for configuration in configurations(robot, 0.01):
-            scene = configuration.scene(robot)
-            assert scene.model.opt.timestep == configuration.timestep
-            assert scene.n_substeps == round(TASK.control_step / configuration.timestep)
+    for configuration in configurations(0.01):
+        scene = configuration.scene()
+        assert scene.model.opt.timestep == configuration.timestep
+        assert scene.n_substeps == round(TASK.control_step / configuration.timestep)

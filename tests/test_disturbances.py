@@ -321,7 +321,7 @@ def test_what_makes_no_sense_is_refused():
         with pytest.raises(UserError, match=message) as caught:
             ExperimentConfig.from_yaml(text, "test")
         assert "\n" not in str(caught.value)
-    scene = load_scene("epuck_planar", "arena")
+    scene = load_scene("epuck", "arena")
     with pytest.raises(UserError, match=r"ideal robots only.*calibrated"):
         make_engine("dm_control", scene, CONFIG, 1)
     with pytest.raises(ValueError, match="no disturbances"):

@@ -38,9 +38,9 @@ def test_fitness_is_the_mean_over_all_starts(scene, starts, genomes):
     assert result.fitness.shape == (6,)
 
 
-def test_engines_agree_to_the_last_bit(mujoco_scene, starts, genomes):
-    batch = evaluate(BatchEngine(mujoco_scene, TASK), NETWORK, genomes, starts)
-    single = evaluate(DmControlEngine(mujoco_scene, TASK), NETWORK, genomes, starts)
+def test_engines_agree_to_the_last_bit(wheels, starts, genomes):
+    batch = evaluate(BatchEngine(wheels, TASK), NETWORK, genomes, starts)
+    single = evaluate(DmControlEngine(wheels, TASK), NETWORK, genomes, starts)
     np.testing.assert_array_equal(batch.trial_fitness, single.trial_fitness)
     np.testing.assert_array_equal(batch.steps, single.steps)
     np.testing.assert_array_equal(batch.crashed, single.crashed)
@@ -54,15 +54,14 @@ def test_chunks_change_nothing(scene, starts, genomes, monkeypatch):
     np.testing.assert_array_equal(whole.crashed, parts.crashed)
 
 
-def test_a_crash_in_the_very_last_step_is_one_for_both_engines(mujoco_scene):
+def test_a_crash_in_the_very_last_step_is_one_for_both_engines(wheels):
     """dm_control's time limit hides it in the discount."""
     ahead = np.zeros((1, 40))
     ahead[:, 32:36] = 5
     start = np.array([[0.38, 0.0, 0.0]])
-    scene = mujoco_scene
-    trial = record(scene, NETWORK.decode(ahead), start[0], TASK)
+    trial = record(wheels, NETWORK.decode(ahead), start[0], TASK)
     task = TaskParameters(steps=trial.steps)
-    for engine in (BatchEngine(scene, task), DmControlEngine(scene, task)):
+    for engine in (BatchEngine(wheels, task), DmControlEngine(wheels, task)):
         result = evaluate(engine, NETWORK, ahead, start)
         assert result.steps[0, 0] == trial.steps
         assert result.crashed[0, 0]

@@ -32,7 +32,7 @@ def straight_on(observation):
 
 @pytest.fixture(scope="module")
 def scene():
-    return load_scene("epuck_planar", "arena", TASK.control_step)
+    return load_scene("epuck_kinematic", "arena", TASK.control_step)
 
 
 @pytest.fixture(scope="module")

@@ -141,11 +141,11 @@ def test_shipped_experiments_need_little():
             assert np.prod(list(factors.values())) * size < 2e8, factors
 
 
-def test_what_is_recorded_is_refused_before_it_is_made(planar, small):
+def test_what_is_recorded_is_refused_before_it_is_made(kinematic, small):
     task, many = TaskParameters(steps=10_000), np.zeros((1000, 3))
     said = r"^1,000 trials of 10,000 control steps needs about [0-9.]+ GB of memory"
     with pytest.raises(UserError, match=said):
-        record_trajectories(planar, WallFollower(), many, task)
+        record_trajectories(kinematic, WallFollower(), many, task)
     with pytest.raises(UserError, match=said):
         record_tracks(None, None, many, task)  # pyright: ignore[reportArgumentType]
     with pytest.raises(UserError, match=r"^noise of 1,000 trials of 10,000 "):

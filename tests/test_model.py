@@ -8,6 +8,7 @@ from epuck_mj import constants as c
 from epuck_mj.check.arena import check_arena
 from epuck_mj.check.findings import Severity
 from epuck_mj.errors import UserError
+from epuck_mj.rungs.table import RUNGS
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.scene.robot_parts import PREFIX, PROXIMITY, ROBOT_BODY
@@ -91,35 +92,8 @@ def test_wheels_and_supports():
         assert geom.condim == 1
 
 
-def test_planar_wheels():
-    """Gears give the wheels' angular velocities, armatures the drives' inertia."""
-    model = load_scene("epuck_planar", "arena").model
-    half = c.TRACK / 2
-    for name, side in (("wheel_left", -1), ("wheel_right", 1)):
-        gear = np.array([1, 0, 0, 0, 0, side * half]) / c.WHEEL_RADIUS
-        np.testing.assert_allclose(model.actuator(PREFIX + name).gear, gear, atol=1e-6)
-    wheel = c.DRIVE_INERTIA + c.WHEEL_MASS * c.WHEEL_RADIUS**2 / 2
-    sliding = 2 * wheel / c.WHEEL_RADIUS**2
-    turning = 2 * wheel * (half / c.WHEEL_RADIUS) ** 2
-    np.testing.assert_allclose(
-        model.dof_armature, [sliding, sliding, turning], rtol=1e-4
-    )
-
-
-def test_both_robots_have_one_interface():
-    models = [load_scene(robot, "arena").model for robot in ("epuck", "epuck_planar")]
-    for kind, count in (("sensor", "nsensor"), ("site", "nsite")):
-        names = [
-            {getattr(model, kind)(i).name for i in range(getattr(model, count))}
-            for model in models
-        ]
-        assert names[0] <= names[1]
-    assert models[0].nu == 2
-
-
-@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
-def test_robot_compiles_alone(robot):
-    mujoco.MjModel.from_xml_path(str(MODELS / f"{robot}.xml"))
+def test_robot_compiles_alone():
+    mujoco.MjModel.from_xml_path(str(MODELS / "epuck.xml"))
 
 
 def test_arena_is_the_paper_s_square_and_opens_as_it_is():
@@ -166,13 +140,13 @@ WALLS = """<mujoco>
 """
 
 
-@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
+@pytest.mark.parametrize("robot", RUNGS)
 def test_an_arena_of_walls_only_gets_the_robot(tmp_path, robot):
     path = tmp_path / "walls.xml"
     path.write_text(WALLS)
     scene = load_scene(robot, str(path))
     assert [scene.model.sensor(name).id for name in PROXIMITY]
-    assert scene.robot.stem == robot
+    assert scene.name == robot
 
 
 def test_an_arena_with_another_include_and_its_own_robot_file(tmp_path):
@@ -184,9 +158,10 @@ def test_an_arena_with_another_include_and_its_own_robot_file(tmp_path):
     includes = '<include file="more.xml"/><include file="mine.xml"/></mujoco>'
     path = tmp_path / "arena.xml"
     path.write_text(WALLS.replace("</mujoco>", includes))
-    scene = load_scene("epuck_planar", str(path))
+    scene = load_scene("epuck", str(path))
     assert scene.model.geom("pillar").id > 0
-    assert scene.model.nq == 3
+    # a free joint and two wheels: one robot
+    assert scene.model.nq == 7 + 2
 
 
 TETRAHEDRON = "v 0 0 0\nv .02 0 0\nv 0 .02 0\nv 0 0 .02\n"
@@ -214,7 +189,7 @@ def test_meshes_are_looked_for_beside_the_arena_and_beside_the_robot(
     mesh = robots / "meshes" / "hat.obj"
     mesh.write_text(TETRAHEDRON)
     robot = robots / "mine.xml"
-    robot.write_text(with_mesh((MODELS / "epuck_planar.xml").read_text()))
+    robot.write_text(with_mesh((MODELS / "epuck.xml").read_text()))
     scene = load_scene(str(robot), "pillars")
     assert scene.model.mesh(f"{PREFIX}hat").id == 0
     assert list(scene.sha256) == ["arena", "robot", "meshes/hat.obj", "../stage.xml"]
@@ -232,11 +207,11 @@ def test_meshes_are_looked_for_beside_the_arena_and_beside_the_robot(
     assert "hat.obj" in refusal(robot=robot, arena="pillars")
 
 
-@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
+@pytest.mark.parametrize("robot", RUNGS)
 def test_a_copied_arena_needs_no_copied_robot(tmp_path, robot):
     path = tmp_path / "copy.xml"
     path.write_text((MODELS / "arena.xml").read_text())
-    assert load_scene(robot, str(path)).robot == MODELS / f"{robot}.xml"
+    assert load_scene(robot, str(path)).robot == MODELS / "epuck.xml"
 
 
 def refusal(robot="epuck", arena="arena", control_step=0.1) -> str:
@@ -257,7 +232,10 @@ def edited(tmp_path, old: str, new: str, source: str = "epuck.xml"):
 
 
 def test_unknown_names_are_refused():
-    assert "one of epuck_kinematic, epuck, epuck_planar" in refusal(robot="e-puck")
+    assert refusal(robot="e-puck") == (
+        "no robot 'e-puck': expected the path of an MJCF file or one of "
+        "epuck_kinematic, epuck"
+    )
     assert "one of arena" in refusal(arena="no/such.xml")
 
 
@@ -267,7 +245,17 @@ def test_unknown_names_are_refused():
         ('<rangefinder name="ps3" site="ps3"/>', "", "no sensor 'ps3'; available: ps0"),
         ('name="shell" geom1', 'name="bump" geom1', "no sensor 'shell'"),
         ('<geom name="shell"', "<geom", "edited.xml"),
-        ('<freejoint name="base"/>', "", "body 'epuck'"),
+        (
+            '<freejoint name="base"/>',
+            "",
+            "expected body 'epuck' with a free joint, got none",
+        ),
+        (
+            '<freejoint name="base"/>',
+            '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>'
+            '<joint axis="0 0 1"/>',
+            "expected body 'epuck' with a free joint, got slide, slide, hinge",
+        ),
         (
             '<rangefinder name="ps3" site="ps3"/>',
             '<gyro name="ps3" site="ps3"/>',
@@ -313,12 +301,12 @@ def test_control_step_is_a_multiple_of_the_physics_step():
 FLOOR = '<geom name="floor" type="plane" size="1 1 0.1" contype="2" conaffinity="2"/>'
 
 
-def test_wheels_need_a_floor_and_the_planar_robot_none(tmp_path):
+@pytest.mark.parametrize("robot", RUNGS)
+def test_wheels_need_a_floor(tmp_path, robot):
     path = tmp_path / "arena.xml"
     assert FLOOR in WALLS
     path.write_text(WALLS.replace(FLOOR, ""))
-    assert "has no floor for the robot's wheels" in refusal("epuck", path)
-    assert load_scene("epuck_planar", str(path)).model.nq == 3
+    assert "has no floor for the robot's wheels" in refusal(robot, path)
 
 
 def test_a_file_with_the_kinematic_robots_name_is_refused(tmp_path):

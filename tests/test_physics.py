@@ -19,12 +19,12 @@ OPEN = """<mujoco>
 """
 
 
-@pytest.fixture(scope="module", params=["epuck", "epuck_planar"])
-def alone(request, tmp_path_factory):
-    """Each robot on a floor without walls."""
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """The robot on wheels on a floor without walls."""
     path = tmp_path_factory.mktemp("arena") / "open.xml"
     path.write_text(OPEN)
-    return load_scene(request.param, str(path))
+    return load_scene("epuck", str(path))
 
 
 def drive(scene, left: float, right: float, seconds: float) -> np.ndarray:

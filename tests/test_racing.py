@@ -25,7 +25,7 @@ from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from tests.shipped import OPTIMIZERS
 
-SCENE = load_scene("epuck_planar", "arena")
+SCENE = load_scene("epuck", "arena")
 SPACE = FreeSpace(SCENE, 0.01)
 NETWORK = Network()
 TASK = TaskParameters(steps=60)

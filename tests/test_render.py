@@ -95,8 +95,9 @@ def test_an_arena_without_light_and_sky_is_on_white(tmp_path):
         ]
     )
     arena = tmp_path / "bare.xml"
-    arena.write_text(f"<mujoco><worldbody>{walls}</worldbody></mujoco>")
-    scene = load_scene("epuck_planar", str(arena), TASK.control_step)
+    floor = '<geom type="plane" size="0.3 0.3 1"/>'
+    arena.write_text(f"<mujoco><worldbody>{floor}{walls}</worldbody></mujoco>")
+    scene = load_scene("epuck", str(arena), TASK.control_step)
     trajectory = record(scene, ahead, np.zeros(3), TASK)
     with painter(scene, [trajectory], *SIZE) as artist:
         picture = artist.picture()

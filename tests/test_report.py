@@ -414,7 +414,7 @@ def check_markdown(text):
 
 
 NASTY = (
-    '<b> a|b *c* `d` [e](f) & "g" _h_ epuck_planar',
+    '<b> a|b *c* `d` [e](f) & "g" _h_ epuck_kinematic',
     "__a__ _b c_d_ &amp; &#35; ~~e~~ ![f](g) <mailto:a@b> \\* \\",
     "[a]: /b",
     *("- a", "+ a", "1. a", "23) a", "# a #", "> a", "***", "___", "```", "    a"),
@@ -447,7 +447,7 @@ def test_text_stands_for_itself(nasty):
 
 
 def test_numbers_stay_readable():
-    plain = "1 [2, 3] p < 0.1 & so, 3-5 runs of epuck_planar (#1)."
+    plain = "1 [2, 3] p < 0.1 & so, 3-5 runs of epuck_kinematic (#1)."
     assert to_markdown([Paragraph(plain)]) == f"{plain}\n"
 
 

@@ -196,8 +196,8 @@ def test_schedule():
 # the robot
 
 
-def test_who_is_there(planar):
-    world = World(planar)
+def test_who_is_there(kinematic):
+    world = World(kinematic)
     with world.robot as robot:
         assert robot.greet() == Greeting(
             "Version 1.2.2 August 2008 GCtronic, HW version: 1.1", "good"
@@ -205,22 +205,22 @@ def test_who_is_there(planar):
 
 
 @pytest.mark.parametrize("build", ["btcom", "epuck2"])
-def test_robots_that_do_not_tell_their_battery(planar, build):
-    world = World(planar, robot=build)
+def test_robots_that_do_not_tell_their_battery(kinematic, build):
+    world = World(kinematic, robot=build)
     with world.robot as robot:
         assert robot.greet().battery == "unknown to this firmware"
     assert world.body.standing
 
 
-def test_a_low_battery(planar):
-    world = World(planar)
+def test_a_low_battery(kinematic):
+    world = World(kinematic)
     world.body.volts = 3.3
     with world.robot as robot:
         assert robot.greet().battery == "low"
 
 
-def test_a_robot_left_driving_is_stopped_first(planar):
-    world = World(planar)
+def test_a_robot_left_driving_is_stopped_first(kinematic):
+    world = World(kinematic)
     world.time.send(b"D,500,500\r")
     world.time.sleep(0.5)
     assert not world.body.standing
@@ -232,8 +232,8 @@ def test_a_robot_left_driving_is_stopped_first(planar):
 @pytest.mark.parametrize(
     "heard", [b"D,5", b"\xbc\x2c", b"\xbc\x2c\x01\x2c\x01\xb2", b"nonsense", b"\r"]
 )
-def test_half_a_word_of_whoever_was_there_before(planar, heard):
-    world = World(planar)
+def test_half_a_word_of_whoever_was_there_before(kinematic, heard):
+    world = World(kinematic)
     world.time.send(b"D,500,500\r")
     world.time.send(heard)
     world.time.sleep(0.5)
@@ -242,8 +242,8 @@ def test_half_a_word_of_whoever_was_there_before(planar, heard):
         assert world.body.standing
 
 
-def test_readings_are_the_sensors(planar):
-    world = World(planar, AT_WALL)
+def test_readings_are_the_sensors(kinematic):
+    world = World(kinematic, AT_WALL)
     with world.robot as robot:
         robot.greet()
         reading = robot.begin()
@@ -254,9 +254,9 @@ def test_readings_are_the_sensors(planar):
         assert not reading.contact
 
 
-def test_gains_of_the_calibration(planar):
+def test_gains_of_the_calibration(kinematic):
     gains = tuple(np.linspace(0.6, 1.5, 8))
-    world = World(planar, AT_WALL, calibration=Calibration(gains))
+    world = World(kinematic, AT_WALL, calibration=Calibration(gains))
     with world.robot as robot:
         robot.greet()
         distance = robot.begin().distance
@@ -264,8 +264,8 @@ def test_gains_of_the_calibration(planar):
     np.testing.assert_array_equal(distance, sensed_distance(counts, np.array(gains)))
 
 
-def test_calibration_of_the_sensors(planar):
-    world = World(planar, AT_WALL)
+def test_calibration_of_the_sensors(kinematic):
+    world = World(kinematic, AT_WALL)
     with world.robot as robot:
         robot.greet()
         robot.calibrate()
@@ -273,8 +273,8 @@ def test_calibration_of_the_sensors(planar):
         np.testing.assert_array_equal(robot.last.proximity, 0)
 
 
-def test_speeds_are_sent_when_they_change_only(planar):
-    world = World(planar)
+def test_speeds_are_sent_when_they_change_only(kinematic):
+    world = World(kinematic)
     with world.robot as robot:
         robot.greet()
         robot.begin()
@@ -288,8 +288,8 @@ def test_speeds_are_sent_when_they_change_only(planar):
     assert world.commands[-1] == (0.0, 0.0)
 
 
-def test_both_wheels_are_slowed_alike(planar):
-    world = World(planar, speed_max=SPEED_MAX / 2)
+def test_both_wheels_are_slowed_alike(kinematic):
+    world = World(kinematic, speed_max=SPEED_MAX / 2)
     with world.robot as robot:
         robot.greet()
         robot.begin()
@@ -303,8 +303,8 @@ def test_both_wheels_are_slowed_alike(planar):
             assert tuple(robot.last.rates) == rates
 
 
-def test_a_dry_run_stands_still(planar):
-    world = World(planar, AT_WALL, dry_run=True)
+def test_a_dry_run_stands_still(kinematic):
+    world = World(kinematic, AT_WALL, dry_run=True)
     world.drive(20)
     assert not any(any(command) for command in world.commands)
     np.testing.assert_allclose(world.body.pose, AT_WALL, atol=1e-6)
@@ -314,8 +314,8 @@ def test_a_dry_run_stands_still(planar):
     assert trajectory.action.any()
 
 
-def test_a_step_lasts_a_control_step(planar):
-    world = World(planar, latency=0.01)
+def test_a_step_lasts_a_control_step(kinematic):
+    world = World(kinematic, latency=0.01)
     world.drive(30)
     times = [step.moment.time for step in world.session.steps]
     np.testing.assert_allclose(np.diff(times), 0.1, atol=0.005)
@@ -323,8 +323,8 @@ def test_a_step_lasts_a_control_step(planar):
     assert world.session.steps[-1].moment.latency == pytest.approx(0.024, abs=0.005)
 
 
-def test_a_slow_line_is_an_overrun_and_no_step_is_shorter(planar):
-    world = World(planar, latency=0.06)
+def test_a_slow_line_is_an_overrun_and_no_step_is_shorter(kinematic):
+    world = World(kinematic, latency=0.06)
     world.drive(20)
     times = [step.moment.time for step in world.session.steps]
     assert world.robot.schedule.n_overruns > 0
@@ -357,22 +357,23 @@ def test_the_loop_is_the_simulations(robot, build):
     assert np.hypot(*(world.robot.odometry.pose - world.body.pose)[:2]) < 0.2
 
 
-def test_the_loop_is_the_plain_simulations_on_the_plane(planar):
-    """Where sensors are never older than a physics step, times make no difference."""
+def test_the_loop_is_the_plain_simulations_with_long_physics_steps():
+    """Where sensors are never older than one of them, times make no difference."""
+    scene = load_scene("epuck_kinematic", "arena", physics_step=0.025)
     start = np.array([0.1, -0.2, 0.7])
-    world = World(planar, start)
+    world = World(scene, start)
     world.drive(200)
-    poses = at_control_steps(planar, world.body.journal, 200)
-    plain = nominal(planar, WallFollower(), TASK, start, 200)[: len(poses)]
+    poses = at_control_steps(scene, world.body.journal, 200)
+    plain = nominal(scene, WallFollower(), TASK, start, 200)[: len(poses)]
     moved, turned = deviation(plain, poses)
     assert len(poses) == 201
     assert moved < 1e-3
     assert turned < math.radians(1)
 
 
-def test_the_same_again_is_the_same(planar):
+def test_the_same_again_is_the_same(kinematic):
     def poses():
-        world = World(planar, AT_WALL, faults="loss@0.5+1,garbage@2", seed=3)
+        world = World(kinematic, AT_WALL, faults="loss@0.5+1,garbage@2", seed=3)
         try:
             world.drive(40)
         except BridgeError as error:
@@ -384,8 +385,8 @@ def test_the_same_again_is_the_same(planar):
     np.testing.assert_array_equal(a, b)
 
 
-def test_trajectory_of_a_session(planar):
-    world = World(planar, AT_WALL)
+def test_trajectory_of_a_session(kinematic):
+    world = World(kinematic, AT_WALL)
     policy = Network().decode(np.linspace(-1, 1, Network().n_genes))
     world.drive(25, policy)
     trajectory = world.session.trajectory(policy)
@@ -415,11 +416,11 @@ def test_a_session_that_read_nothing():
 
 
 @pytest.fixture
-def at_wall(planar):
+def at_wall(kinematic):
     worlds = []
 
     def make(faults, **options):
-        worlds.append(World(planar, AT_WALL, faults=faults, **options))
+        worlds.append(World(kinematic, AT_WALL, faults=faults, **options))
         return worlds[-1]
 
     yield make
@@ -476,8 +477,8 @@ def test_a_lost_link_is_stopped_as_soon_as_it_returns(at_wall, duration):
     assert world.time.now - returned < 0.5
 
 
-def test_a_link_lost_for_ever_is_said_so(planar):
-    world = World(planar, AT_WALL, faults="gone@1")
+def test_a_link_lost_for_ever_is_said_so(kinematic):
+    world = World(kinematic, AT_WALL, faults="gone@1")
     with pytest.raises(StillMoving, match="expected the robot to say that it stopped"):
         world.drive(100)
     assert world.time.now - world.began < 1 + STOP_TIME_MAX + 0.5
@@ -616,12 +617,12 @@ def offsets(world, build):
 
 
 @pytest.mark.parametrize("seed", range(N_SCENARIOS))
-def test_random_faults(planar, seed):
+def test_random_faults(kinematic, seed):
     """No hang, no wrong reading, the cause is named, and the robot stands."""
     build = ("asercom", "btcom", "epuck2")[seed % 3]
     faults = random_scenario(seed, END)
     latency = (0.0, 0.005, 0.015)[seed // 3 % 3]
-    world = World(planar, AT_WALL, build, faults, latency, seed=seed)
+    world = World(kinematic, AT_WALL, build, faults, latency, seed=seed)
     error = None
     try:
         world.drive(60)

@@ -531,7 +531,7 @@ def arena(walls=WALLS) -> str:
 
 
 GA = "optimizer: {algorithm: genetic_algorithm}\n"
-FULL = (MODELS / "epuck_planar.xml").read_text()
+FULL = (MODELS / "epuck.xml").read_text()
 
 
 @pytest.mark.parametrize(
@@ -584,7 +584,7 @@ def test_a_bad_experiment_file_is_refused(content, words, refusal, here):
         (["ga", "--control-step", "0.0333"], ("multiple", "got 0.0333 s")),
         (["ga", "--control-step", "0.0001"], ("multiple", "got 0.0001 s")),
         (["ga", "--start-clearance", "0.6"], ("no room for a start",)),
-        (["ga", "--robot", "nope"], ("no robot 'nope'", "epuck, epuck_planar")),
+        (["ga", "--robot", "nope"], ("no robot 'nope'", "epuck_kinematic, epuck")),
         (["ga", "--arena", "nope"], ("no arena 'nope'", "arena")),
         (["--resume"], ("--resume",)),
         (["--resume", "nowhere"], ("no run in 'nowhere'", "nowhere/config.yaml")),
@@ -623,14 +623,19 @@ def test_a_bad_arena_is_refused(text, words, refusal, here):
             ("no sensor 'ps3'", "available: ps0, ps1, ps2, ps4"),
         ),
         (
-            lambda text: text.replace('name="wheel_left"', 'name="left"'),
+            lambda text: text.replace(
+                '<velocity name="wheel_left"', '<velocity name="left"'
+            ),
             ("no actuator 'wheel_left'", "available: left, wheel_right"),
         ),
         (
             lambda text: text.replace('name="epuck"', 'name="robot"'),
             ("no body 'epuck'",),
         ),
-        (lambda text: text.replace('type="hinge"', 'type="ball"'), ("mine.xml",)),
+        (
+            lambda text: text.replace("<freejoint", '<joint type="ball"'),
+            ("mine.xml", "expected body 'epuck' with a free joint, got ball"),
+        ),
         (lambda text: text[: len(text) // 2], ("mine.xml",)),
         (lambda text: text.replace("site=", "place=", 1), ("mine.xml",)),
     ],

@@ -33,7 +33,7 @@ def full() -> dict:
     return {
         "stored": 120.0,
         "validation": 101.0,
-        "held_out": {"epuck": test, "epuck_planar": test},
+        "held_out": {"epuck": test, "epuck_kinematic": test},
         "most_believed": {"stored": 130.0, "held_out": 90.0},
         "held_out_as_evolved": {"epuck": test},
     }

@@ -20,8 +20,8 @@ N = 12
 
 
 @pytest.fixture(scope="module")
-def scene(mujoco_scene) -> Scene:
-    return mujoco_scene
+def scene(wheels) -> Scene:
+    return wheels
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +120,7 @@ def test_too_many_starts_are_refused(scene):
 
 
 def test_the_hand_written_wall_follower_follows_walls(scene):
-    """On both robots it lives and earns more than half of what there is to earn."""
+    """It lives and earns more than half of what there is to earn."""
     starts = FreeSpace(scene, 0.01).sample(np.random.default_rng(3), 40)
     robots = MujocoRobots(scene, 40)
     trials = run_trials(robots, WallFollower(), starts, TaskParameters())

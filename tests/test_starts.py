@@ -8,6 +8,7 @@ import scipy.stats
 from epuck_mj.constants import BODY_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.host.limits import LIMITS
+from epuck_mj.rungs.table import RUNGS
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace, survey
 
@@ -101,9 +102,10 @@ def test_seed_decides_and_a_longer_list_begins_with_the_shorter(scene):
     assert not np.array_equal(short, other)
 
 
-def test_both_robots_get_the_same_starts():
-    wheeled, planar = (sample(robot, "arena") for robot in ("epuck", "epuck_planar"))
-    np.testing.assert_array_equal(wheeled, planar)
+def test_each_rung_gets_the_same_starts():
+    first, *others = (sample(robot, "arena") for robot in RUNGS)
+    for other in others:
+        np.testing.assert_array_equal(first, other)
 
 
 def test_an_l_shape_is_filled_and_never_left(tmp_path):
@@ -117,7 +119,7 @@ def test_an_l_shape_is_filled_and_never_left(tmp_path):
         wall(0.25, 0.01, 0.26, 0.01),
         wall(0.01, 0.25, 0.01, 0.26),
     )
-    starts = sample("epuck_planar", path, 2000)
+    starts = sample("epuck", path, 2000)
     x, y = starts[:, 0], starts[:, 1]
     assert not ((x > 0) & (y > 0)).any()
     shares = [((x < 0) & (y > 0)).mean(), ((x < 0) & (y < 0)).mean()]
@@ -126,7 +128,7 @@ def test_an_l_shape_is_filled_and_never_left(tmp_path):
 
 def test_pillars_and_round_walls_are_kept_clear_of(tmp_path):
     pillar = '<geom type="cylinder" pos="0.1 0.1 0.03" size="0.08 0.03"/>'
-    starts = sample("epuck_planar", arena(tmp_path, *room(), pillar), 2000)
+    starts = sample("epuck", arena(tmp_path, *room(), pillar), 2000)
     gap = np.hypot(starts[:, 0] - 0.1, starts[:, 1] - 0.1) - 0.08 - BODY_RADIUS
     assert CLEARANCE - 1e-6 <= gap.min() < CLEARANCE + 0.01
 
@@ -135,7 +137,7 @@ def test_a_room_within_walls_only(tmp_path):
     """A closed box in the middle is outside for a robot too big for it."""
     inner = [wall(0, 0.05, 0.05, 0.01), wall(0, -0.05, 0.05, 0.01)]
     inner += [wall(0.05, 0, 0.01, 0.05), wall(-0.05, 0, 0.01, 0.05)]
-    starts = sample("epuck_planar", arena(tmp_path, *room(), *inner))
+    starts = sample("epuck", arena(tmp_path, *room(), *inner))
     assert np.abs(starts[:, :2]).max(axis=1).min() > 0.06
 
 
@@ -149,7 +151,7 @@ def test_a_room_within_walls_only(tmp_path):
     ],
 )
 def test_arenas_without_a_place_are_refused(tmp_path, geoms, expected):
-    scene = load_scene("epuck_planar", arena(tmp_path, *geoms))
+    scene = load_scene("epuck", arena(tmp_path, *geoms))
     with pytest.raises(UserError, match=expected):
         FreeSpace(scene, CLEARANCE)
 
@@ -168,8 +170,8 @@ def test_scenes_that_are_compiled_alike_are_surveyed_once(tmp_path):
     assert survey(edited, CLEARANCE) is not smaller
 
 
-def test_as_many_starts_as_are_allowed_are_found(planar):
+def test_as_many_starts_as_are_allowed_are_found(kinematic):
     """Not only those that a fixed number of candidates holds."""
     n = int(LIMITS["starts"].most)
-    starts = FreeSpace(planar, 0.01).sample(np.random.default_rng(0), n)
+    starts = FreeSpace(kinematic, 0.01).sample(np.random.default_rng(0), n)
     assert starts.shape == (n, 3)

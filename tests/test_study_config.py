@@ -301,7 +301,7 @@ def test_more_experiments_join(here):
 
 @pytest.mark.parametrize(
     ("key", "values"),
-    [("steps", (300, 60)), ("robot", ("epuck_planar", "epuck"))],
+    [("steps", (300, 60)), ("robot", ("epuck_kinematic", "epuck"))],
 )
 def test_experiments_that_no_report_compares_are_refused(key, values, here):
     """At the start of the study, and by the rule of the report."""

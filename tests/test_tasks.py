@@ -21,10 +21,8 @@ def name(request) -> str:
     return request.param
 
 
-def make(name: str, seed: int = 1, robot: str = "epuck_planar", parameters=SHORT):
-    return epuck_mj.load(
-        name, {"random": seed, "robot": robot, "parameters": parameters}
-    )
+def make(name: str, seed: int = 1, parameters=SHORT):
+    return epuck_mj.load(name, {"random": seed, "parameters": parameters})
 
 
 def play(env, n_steps: int, seed: int = 0) -> list[dm_env.TimeStep]:
@@ -34,9 +32,8 @@ def play(env, n_steps: int, seed: int = 0) -> list[dm_env.TimeStep]:
     return [env.reset(), *(env.step(action) for action in actions)]
 
 
-@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
-def test_specs_are_obeyed(name, robot):
-    env = make(name, robot=robot)
+def test_specs_are_obeyed(name):
+    env = make(name)
     action = env.action_spec()
     assert isinstance(action, specs.BoundedArray)
     np.testing.assert_array_equal(action.minimum, [0, -1])
@@ -65,7 +62,7 @@ def test_seed_decides(name):
 
 def test_episodes_of_one_seed_differ(name):
     env = make(name)
-    scene = load_scene("epuck_planar", "arena")
+    scene = load_scene("epuck", "arena")
     poses = []
     for _ in range(5):
         env.reset()
@@ -92,9 +89,8 @@ def test_episode_ends_after_its_steps(name):
     assert env.step(np.zeros(2)).first()
 
 
-@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
-def test_default_episode_is_300_steps_of_a_tenth_of_a_second(name, robot):
-    env = epuck_mj.load(name, {"random": 1, "robot": robot})
+def test_default_episode_is_300_steps_of_a_tenth_of_a_second(name):
+    env = epuck_mj.load(name, {"random": 1})
     assert env.control_timestep() == pytest.approx(0.1)
     env.reset()
     steps = 0
@@ -195,7 +191,7 @@ def test_what_random_may_be_is_one_line(name, random):
 
 @pytest.mark.parametrize("random", [0, np.int64(3), np.random.RandomState(3), None])
 def test_random_is_a_seed_a_generator_or_nothing(name, random):
-    epuck_mj.load(name, {"random": random, "robot": "epuck_planar"}).reset()
+    epuck_mj.load(name, {"random": random}).reset()
 
 
 def test_a_robot_that_mujoco_does_not_move_is_refused():

@@ -45,11 +45,10 @@ def champion(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("robot", ["epuck", "epuck_planar"])
 @pytest.mark.parametrize("policy", [WallFollower(), straight_on])
 @pytest.mark.parametrize("noise", ["none", "strong"])
-def test_a_trial_is_the_one_that_record_gives(robot, policy, noise):
-    scene = load_scene(robot, "pillars")
+def test_a_trial_is_the_one_that_record_gives(policy, noise):
+    scene = load_scene("epuck", "pillars")
     watched = WatchedRobot(scene)
     # one robot for all trials: a reset leaves nothing of the one before
     starts = FreeSpace(scene, 0.01).sample(np.random.default_rng(0), 4)
@@ -91,7 +90,7 @@ class FakeWindow:
 
 def test_trials_follow_each_other_until_the_window_is_closed(monkeypatch):
     monkeypatch.setattr(windows.time, "sleep", lambda seconds: None)
-    scene, start = load_scene("epuck_planar", "arena"), np.array([0.4, 0, 0])
+    scene, start = load_scene("epuck", "arena"), np.array([0.4, 0, 0])
     task = TaskParameters(steps=20)
     expected = record(scene, straight_on, start, task)
     assert expected.crashed
@@ -180,7 +179,7 @@ def test_bad_input_is_one_line(champion, capsys):
 
 
 def test_starts_are_those_asked_for():
-    scene = load_scene("epuck_planar", "arena")
+    scene = load_scene("epuck", "arena")
     options = view.Options("arena", pose=(0.1, 0.2, 90.0))
     starts = view._starts(scene, options)
     for _ in range(2):
@@ -279,7 +278,7 @@ def test_without_glfw_one_line_says_so(monkeypatch):
         raise ImportError(f"no {name}")
 
     monkeypatch.setattr(windows.importlib, "import_module", missing)
-    scene = load_scene("epuck_planar", "arena")
+    scene = load_scene("epuck", "arena")
     robot = WatchedRobot(scene)
     with (
         pytest.raises(UserError, match="cannot open a window"),

@@ -57,7 +57,7 @@ def pillar(x: float, y: float, radius: float) -> str:
 
 
 def loops_of(path: str) -> tuple[WallLoops, ClearanceProbe]:
-    scene = load_scene("epuck_planar", path)
+    scene = load_scene("epuck", path)
     probe = ClearanceProbe(scene)
     return wall_loops(scene), probe
 

@@ -37,6 +37,9 @@ N_RANDOM = 15
 KINEMATIC_SEEDS = range(1, 11)
 """Seeds of the runs of DE/best on the kinematic robot, which are made here."""
 
+MADE_HERE = "kinematic/de-best"
+"""What the names of their champions begin with."""
+
 
 @dataclass(frozen=True, eq=False)
 class Tried:
@@ -120,7 +123,7 @@ def _on_kinematic_robot(evolved: dict[str, list[float]]) -> Iterator[Tried]:
         update={"robot": KINEMATIC_ROBOT, "climb": 1.0, "finalists": 0}
     )
     for seed in KINEMATIC_SEEDS:
-        name = f"kinematic/de-best/seed-{seed}"
+        name = f"{MADE_HERE}/seed-{seed}"
         if name not in evolved:
             evolution = Evolution(config.model_copy(update={"seed": seed}))
             for _ in evolution.run():

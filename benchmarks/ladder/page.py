@@ -7,9 +7,8 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.ladder.controllers import CHAMPION, Tried
+from benchmarks.ladder.controllers import CHAMPION, MADE_HERE, Tried
 from epuck_mj.host import files
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT
 from epuck_mj.show import colors
 from epuck_mj.show.colors import fraction
 from epuck_mj.show.pictures import save_figure
@@ -22,16 +21,13 @@ Column = Mapping[str, Sequence[float]]
 SETS: Mapping[str, Callable[[Tried], bool]] = {
     "all": lambda each: True,
     "shipped champions": lambda each: (
-        each.kind == CHAMPION and each.evolved_on != KINEMATIC_ROBOT
+        each.kind == CHAMPION and not each.name.startswith(MADE_HERE)
     ),
     "champions of wheels": lambda each: (
         (each.kind, each.evolved_on) == (CHAMPION, "epuck")
     ),
-    "champions of the kinematic robot": lambda each: (
-        (each.kind, each.evolved_on) == (CHAMPION, "epuck_kinematic")
-    ),
-    "champions of the planar robot": lambda each: (
-        (each.kind, each.evolved_on) == (CHAMPION, "epuck_planar")
+    "champions of the kinematic robot alone": lambda each: each.name.startswith(
+        MADE_HERE
     ),
     "not yet evolved far": lambda each: each.kind != CHAMPION,
 }

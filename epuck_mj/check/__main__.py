@@ -13,7 +13,7 @@ from typing import Annotated
 import tyro
 
 from epuck_mj.host.command_line import check_ending, main, parse, word
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT, SHIPPED_ROBOTS
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 
 EXAMPLES = (
     "python -m epuck_mj.check my.xml",
@@ -31,7 +31,7 @@ class Options:
     arena: tyro.conf.Positional[Annotated[str, word("ARENA")]]
     """name of a shipped arena, or path of an MJCF file"""
     robot: Annotated[str | None, word("ROBOT")] = None
-    """name of a shipped robot, or path of an MJCF file; all shipped ones by default"""
+    """name of a shipped robot, or path of an MJCF file; both shipped ones by default"""
     picture: Annotated[Path | None, word("FILE")] = None
     """PNG file to draw the walls and the free space to, seen from above"""
 
@@ -44,7 +44,7 @@ def check(argv: Sequence[str]) -> int:
     from epuck_mj.check import report
     from epuck_mj.check.arena import check_arena
 
-    shipped = [*(Path(name).stem for name in SHIPPED_ROBOTS), KINEMATIC_ROBOT]
+    shipped = [WHEELED_ROBOT, KINEMATIC_ROBOT]
     robots = [options.robot] if options.robot else shipped
     checked = check_arena(options.arena, robots, _tell)
     for line in report.lines(checked.arena, checked.findings):

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.rungs.simulator import CompiledTrials, Simulator
 from epuck_mj.scene.model import Scene
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 from epuck_mj.step.control import TaskParameters
 
 
@@ -22,8 +22,7 @@ def _kinematic(scene: Scene, capacity: int, threads: int) -> Simulator:
 
 RUNGS: Mapping[str, Callable[[Scene, int, int], Simulator]] = {
     KINEMATIC_ROBOT: _kinematic,
-    "epuck": MujocoRobots,
-    "epuck_planar": MujocoRobots,
+    WHEELED_ROBOT: MujocoRobots,
 }
 """Makers of simulators by the robot's name; other robots use MuJoCo."""
 

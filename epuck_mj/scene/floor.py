@@ -11,13 +11,7 @@ import mujoco
 import numpy as np
 
 from epuck_mj.errors import UserError
-from epuck_mj.scene.robot_parts import (
-    ROBOT_BODY,
-    SHELL,
-    can_touch,
-    of_robot,
-    static,
-)
+from epuck_mj.scene.robot_parts import SHELL, can_touch, of_robot, static
 
 FLOOR_BITS = 2
 
@@ -140,9 +134,7 @@ def check_floor(model: mujoco.MjModel, height: float, arena: Path) -> None:
     planes = model.geom_type == _SHAPE.mjGEOM_PLANE
     # all that is below a plane is inside of it
     above = planes & (top > height + HEIGHT) & can_touch(model, model.geom(SHELL).id)
-    base = model.body_jntadr[model.body(ROBOT_BODY).id]
-    rolls = model.jnt_type[base] == mujoco.mjtJoint.mjJNT_FREE
-    if not above.any() and (not rolls or floors(model, height).any()):
+    if not above.any() and floors(model, height).any():
         return
     if above.any():
         top = np.where(above, top, np.nan)

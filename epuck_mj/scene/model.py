@@ -1,9 +1,8 @@
 """Scenes: a robot put into an arena, checked, compiled, names turned into indices.
 
 An arena is any MJCF with walls. It may include a robot, so that MuJoCo's viewer shows
-the whole scene; `load_scene` puts the robot asked for in that one's place. Robots
-differ in their base only, which the methods of `Scene` hide from other modules. The
-robot's physics is its own in every arena: see `mjcf`.
+the whole scene; `load_scene` puts the robot asked for in that one's place. The robot's
+physics is its own in every arena: see `mjcf`.
 """
 
 import copy
@@ -71,33 +70,26 @@ class Scene:
     _touches: slice
 
     @cached_property
-    def _base(self) -> tuple[int, bool]:
-        """First index of the base in qpos, and whether it is a free joint."""
-        joint = self.model.body(ROBOT_BODY).jntadr[0]
-        free = self.model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
-        return int(self.model.jnt_qposadr[joint]), bool(free)
+    def _base(self) -> int:
+        """First index of the robot's free joint in qpos."""
+        return int(self.model.jnt_qposadr[self.model.body(ROBOT_BODY).jntadr[0]])
 
     def qpos(self, poses: np.ndarray) -> np.ndarray:
         """Positions `(..., nq)` with the robot on `(..., 3)`: x, y [m], yaw [rad]."""
         poses = np.asarray(poses, float)
-        base, free = self._base
+        base = self._base
         qpos = np.broadcast_to(
             self.model.qpos0, (*poses.shape[:-1], self.model.nq)
         ).copy()
-        if free:
-            qpos[..., base : base + 2] = poses[..., :2]
-            qpos[..., base + 3] = np.cos(poses[..., 2] / 2)
-            qpos[..., base + 4 : base + 6] = 0.0
-            qpos[..., base + 6] = np.sin(poses[..., 2] / 2)
-        else:
-            qpos[..., base : base + 3] = poses
+        qpos[..., base : base + 2] = poses[..., :2]
+        qpos[..., base + 3] = np.cos(poses[..., 2] / 2)
+        qpos[..., base + 4 : base + 6] = 0.0
+        qpos[..., base + 6] = np.sin(poses[..., 2] / 2)
         return qpos
 
     def poses(self, qpos: np.ndarray) -> np.ndarray:
         """Poses of the robot, `(..., 3)`: x, y [m], yaw [rad], from `(..., nq)`."""
-        base, free = self._base
-        if not free:
-            return qpos[..., base : base + 3].copy()
+        base = self._base
         w, x, y, z = np.moveaxis(qpos[..., base + 3 : base + 7], -1, 0)
         yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
         return np.concatenate([qpos[..., base : base + 2], yaw[..., None]], axis=-1)

@@ -12,7 +12,9 @@ MODELS = next(
     folder for folder in (_HERE / "models", _HERE.parent / "models") if folder.is_dir()
 )
 
-SHIPPED_ROBOTS = ("epuck.xml", "epuck_planar.xml")
+ROBOT_FILE = "epuck.xml"
+"""MJCF of the shipped robot."""
+
 KINEMATIC_ROBOT = "epuck_kinematic"
 """Name of the robot on wheels when it is simulated without MuJoCo's physics."""
 
@@ -38,11 +40,9 @@ def find_robot(name: str) -> Path:
             f"robot '{name}': expected another file name; '{KINEMATIC_ROBOT}' is the "
             "shipped robot that is simulated without MuJoCo"
         )
-    by_name = {
-        # the same robot, simulated in another way
-        KINEMATIC_ROBOT: MODELS / "epuck.xml",
-        **{Path(file).stem: MODELS / file for file in SHIPPED_ROBOTS},
-    }
+    # one robot, simulated in two ways
+    shipped = MODELS / ROBOT_FILE
+    by_name = {KINEMATIC_ROBOT: shipped, WHEELED_ROBOT: shipped}
     return find(name, "robot", by_name, "an MJCF").resolve()
 
 

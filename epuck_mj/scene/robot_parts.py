@@ -30,17 +30,13 @@ def check_base(model: mujoco.MjModel, robot: Path) -> None:
     """
     body = index_of(model, mujoco.mjtObj.mjOBJ_BODY, ROBOT_BODY, robot)
     first, count = model.body_jntadr[body], model.body_jntnum[body]
-    types = tuple(model.jnt_type[first : first + count])
-    planar = (_JOINT.mjJNT_SLIDE, _JOINT.mjJNT_SLIDE, _JOINT.mjJNT_HINGE)
-    axes = model.jnt_axis[first : first + count]
-    at_origin = not model.body_pos[body, :2].any()
-    if types == (_JOINT.mjJNT_FREE,):
+    types = [_JOINT(kind) for kind in model.jnt_type[first : first + count]]
+    if types == [_JOINT.mjJNT_FREE]:
         return
-    if types == planar and np.array_equal(axes, np.eye(3)) and at_origin:
-        return
+    kinds = [kind.name.removeprefix("mjJNT_").lower() for kind in types]
     raise UserError(
-        f"robot '{robot}': expected body '{OWN_BODY}' at the origin with a free "
-        "joint or with slides along x and y and a hinge about z"
+        f"robot '{robot}': expected body '{OWN_BODY}' with a free joint, "
+        f"got {', '.join(kinds) or 'none'}"
     )
 
 

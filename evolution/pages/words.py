@@ -37,7 +37,6 @@ PAPERS = ("de-best", "de-rand", "ga")
 
 ROBOT_NAMES: Mapping[str, str] = {
     "epuck_kinematic": "kinematic robot",
-    "epuck_planar": "planar robot",
     "epuck": "wheeled robot",
 }
 

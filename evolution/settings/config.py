@@ -57,8 +57,7 @@ class ExperimentConfig(BaseModel):
     robot: Annotated[str, word("ROBOT")] = Field(
         KINEMATIC_ROBOT,
         description="epuck_kinematic (the robot on wheels without physics: hundreds "
-        "of times faster), epuck (on wheels in MuJoCo), epuck_planar (slides on a "
-        "plane in MuJoCo) or the path of an MJCF file",
+        "of times faster), epuck (on wheels in MuJoCo) or the path of an MJCF file",
     )
     climb: Annotated[float, within("climb")] = Field(
         0.9,
