@@ -55,7 +55,7 @@ def run(seed: int, best: float, mean: float, held_out: float, follows: float = 1
             starts=1000,
             behaviour={"crashed": 1 - follows, "hugger": follows},
         )
-        for robot in ("epuck_planar", "epuck")
+        for robot in ("epuck_kinematic", "epuck")
     }
     scores = Scores(
         stored=best,
@@ -91,7 +91,7 @@ def study(best: dict[str, float], mean=None, n: int = 12, **changes) -> StudyDat
         "path": Path("paper"),
         "configs": {name: load_config(find_config(name)) for name in NAMES},
         "runs": {name: () for name in NAMES} | runs,
-        "robots": ("epuck_planar", "epuck"),
+        "robots": ("epuck_kinematic", "epuck"),
         "steps": 300,
         "yardstick": {},
         "missing": (),
@@ -347,7 +347,7 @@ def test_behaviour_is_judged_on_the_last_robot():
 def test_runs_without_behaviour_leave_it_open():
     data = study(LIKE_THE_PAPER)
     test = HeldOut(mean=245.0, crash_rate=0.0, starts=1000)
-    older = Scores(stored=245.0, held_out={"epuck_planar": test, "epuck": test})
+    older = Scores(stored=245.0, held_out={"epuck_kinematic": test, "epuck": test})
     runs = tuple(replace(run, scores=older) for run in data.runs["ga"])
     data = replace(data, runs={**data.runs, "ga": runs})
     assert verdict(claims(data), "GA", "without crashing (strict") == NOT_MEASURED
@@ -403,7 +403,7 @@ def test_reproduction_says_everything_once():
         LIKE_THE_PAPER,
         missing=("ga: no finished run of seed 9",),
         yardstick={
-            "epuck_planar": HeldOut(mean=195.8, crash_rate=0.0, starts=1000),
+            "epuck_kinematic": HeldOut(mean=195.8, crash_rate=0.0, starts=1000),
             "epuck": HeldOut(mean=196.9, crash_rate=0.0, starts=1000),
         },
     )

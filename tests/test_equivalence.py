@@ -19,7 +19,7 @@ EARLIER = {
         *(204.5, 232.4, 211.7, 222.7, 141.9, 219.1, 217.3, 209.2, 192.3, 164.7),
     ],
 }
-"""Held-out fitness of the study before: runs on a planar robot, tested on wheels."""
+"""Held-out fitness on wheels of the runs of an earlier study, on another simulator."""
 
 
 def pool() -> np.ndarray:
