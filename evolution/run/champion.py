@@ -56,12 +56,14 @@ class Stored:
         fitness: of the final population, `(n,)`.
         best_genomes: the best individual of each generation, `(generations, genes)`.
         best: its fitness, `(generations,)`.
+        climbed: whether that was on wheels, after the run had climbed.
     """
 
     population: np.ndarray
     fitness: np.ndarray
     best_genomes: np.ndarray
     best: np.ndarray
+    climbed: bool = False
 
 
 def stored_by(evolution: Evolution) -> Stored:
@@ -73,6 +75,7 @@ def stored_by(evolution: Evolution) -> Stored:
         evolution.optimizer.fitness,
         np.array(evolution.best_genomes[first:]),
         np.array([record.best for record in evolution.records[first:]]),
+        evolution.climbed,
     )
 
 

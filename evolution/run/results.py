@@ -116,7 +116,7 @@ def judged(
     # what the run believed its best to be, and what that is worth where it evolved
     tell("Testing the individual of the highest fitness")
     genome, believed = best or most_believed(stored)
-    where = WHEELED_ROBOT if evolution.climbed else Path(config.robot).name
+    where = WHEELED_ROBOT if stored.climbed else Path(config.robot).name
     worth = judges[where].fitness(config.topology, genome, n)
     scores = Scores(
         stored=champion.stored_fitness,

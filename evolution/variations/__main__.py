@@ -11,7 +11,8 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse, word
 
 EXAMPLES = (
-    "python -m evolution.variations results/variations --output report-variations",
+    "python -m evolution.variations runs/variations --output report-variations",
+    "python -m evolution.variations runs/variations runs/steps-150 --output report",
 )
 
 FIGURE = "variations"

@@ -194,7 +194,7 @@ def stored_without_checkpoint(written: Written, evolution: Evolution) -> Stored:
     genome, believed = written.controller.genome, written.champion["scores"]["stored"]
     if genome.size != genomes.shape[1]:
         nobody = np.empty((0, genomes.shape[1])), np.empty(0)
-        return Stored(*nobody, genomes, fitness)
+        return Stored(*nobody, genomes, fitness, bool(climbed.any()))
     # it was the best of some generations, or it earned in one what it is believed
     as_best = fitness[(genomes == genome).all(axis=1)]
     # an own optimiser may store what it likes
@@ -206,7 +206,8 @@ def stored_without_checkpoint(written: Written, evolution: Evolution) -> Stored:
             believed = as_best[-1] if as_best.size else earned.max()
     alone = genome[None], np.array([believed])
     # which others the champion was chosen from, the tables do not say
-    return Stored(*alone, *(alone if written.packed else (genomes, fitness)))
+    bests = alone if written.packed else (genomes, fitness)
+    return Stored(*alone, *bests, bool(climbed.any()))
 
 
 def _earned(evolution: Evolution, genome: np.ndarray, generations: range) -> np.ndarray:
