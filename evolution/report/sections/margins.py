@@ -36,7 +36,7 @@ def margins_section(data: StudyData) -> list[Block]:
         Heading("How close to the edge champions drive"),
         Paragraph(
             "Fitness of the champions on the kinematic robot when one number of the "
-            "robot is changed, and in brackets the median share of trials that crash. "
+            "robot is changed, then the median share of trials that crash. "
             "Sources for the radius of the body differ by 1 to 4 mm. All sensors are "
             "set back together. Commands that are late arrive one control step later."
         ),
