@@ -34,9 +34,9 @@ class ReproduceOptions:
     Writes studies, reports and REPRODUCTION.md. Call it again to continue.
 
     Attributes:
-        quick: run three seeds with a twentieth of the budget, about 2 minutes on two
+        quick: run three seeds with a twentieth of the budget, about a minute on two
             cores. Shows only that everything works.
-        full: run 100 seeds of the paper's algorithms and of all baselines, about 3
+        full: run 100 seeds of the paper's algorithms and of all baselines, about 5
             hours on two idle cores.
         output: directory for everything that is written.
         study: run nothing and report this study directory instead.
@@ -59,8 +59,8 @@ def reproduce_paper(argv: Sequence[str]) -> int:
         raise UserError("expected --study with --wheels")
     if [options.quick, options.full, options.study is not None].count(True) != 1:
         raise UserError(
-            "expected one of --quick (3 seeds, about 2 minutes on two cores), --full "
-            "(100 seeds, about 3 hours on two idle cores) and --study (write the "
+            "expected one of --quick (3 seeds, about a minute on two cores), --full "
+            "(100 seeds, about 5 hours on two idle cores) and --study (write the "
             "verdict on a study that is there)"
         )
     study_names = [each.name for each in (options.study, options.wheels) if each]
