@@ -3,6 +3,7 @@
 Figures have the size they are printed at, so that text keeps its size.
 """
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import cycle
@@ -48,6 +49,18 @@ Also saved, because matplotlib makes ticks only when it draws.
 
 HANDLE, LETTER = 0.5, 0.054
 """Width of a legend's handle with its gaps, and of a letter beside it [inch]."""
+
+ROW, ROWS = 0.17, 4
+"""Height of a row of a legend [inch], and how many rows a figure's height is for."""
+
+FEW = 6
+"""Most experiments whose curves fit a figure of one column."""
+
+
+def width_for(n: int) -> float:
+    """Width of a figure with the curves of so many experiments [inch]."""
+    return COLUMN if n <= FEW else PAGE
+
 
 Color = tuple[float, float, float]
 Dashes = tuple[float, tuple[float, ...]] | str
@@ -134,13 +147,16 @@ def legend_below(
 ) -> None:
     """A legend under all axes from handles by label, in as many columns as fit."""
     width = HANDLE + LETTER * max(map(len, handles), default=0)
-    columns = int(figure.get_figwidth() / width)
+    columns = min(max(int(figure.get_figwidth() / width), 1), len(handles))
+    # the axes keep their height
+    rows = math.ceil(len(handles) / max(columns, 1))
+    figure.set_figheight(figure.get_figheight() + ROW * max(0, rows - ROWS))
     figure.legend(
         list(handles.values()),
         list(handles),
         title=title,
         loc="outside lower center",
-        ncols=min(max(columns, 1), len(handles)),
+        ncols=columns,
         columnspacing=1.5,
     )
 

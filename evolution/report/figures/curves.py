@@ -18,6 +18,7 @@ from evolution.pages.style import (
     counts,
     legend_below,
     looks,
+    width_for,
     with_count,
 )
 from evolution.pages.words import YARDSTICK_LABEL, label, robot_name
@@ -119,9 +120,9 @@ def growth_figure(data: StudyData, name: str) -> tuple[Figure, str]:
 @matplotlib.rc_context(PRINT)
 def growths_figure(data: StudyData) -> tuple[Figure, str]:
     """Best so far of all experiments on one axes."""
-    figure = Figure(figsize=(COLUMN, 3.3), layout="constrained")
-    axes = figure.add_subplot()
     lines, styles, runs, last = {}, looks(data.configs), data.with_runs, 0.0
+    figure = Figure(figsize=(width_for(len(runs)), 3.3), layout="constrained")
+    axes = figure.add_subplot()
     for i, (name, each) in enumerate(runs.items()):
         grid = common_grid(each)
         best = curves(each, "best", grid, so_far=True)
@@ -142,9 +143,9 @@ def growths_figure(data: StudyData) -> tuple[Figure, str]:
 @matplotlib.rc_context(PRINT)
 def targets_figure(data: StudyData) -> tuple[Figure, str]:
     """Share of all pairs of run and target reached, against evaluations."""
-    figure = Figure(figsize=(COLUMN, 3.2), layout="constrained")
-    axes = figure.add_subplot()
     lines, styles, runs = {}, looks(data.configs), data.with_runs
+    figure = Figure(figsize=(width_for(len(runs)), 3.2), layout="constrained")
+    axes = figure.add_subplot()
     last = max(run.history["evaluations"][-1] for each in runs.values() for run in each)
     budgets = np.linspace(0, last, N_POINTS + 1)
     for i, (name, each) in enumerate(runs.items()):
