@@ -35,7 +35,7 @@ from evolution.study.directory import StudyDirectory
 from evolution.study.histories import history_of
 from evolution.study.jobs import Event, Job, carry_out, failure_log, failure_of
 from evolution.study.packed_run import PackedRun
-from evolution.study.packing import Packer
+from evolution.study.packing import Packer, pack
 from tests.no_pictures import INSTEAD, draw_nothing
 from tests.processes import PATIENCE, python_process
 
@@ -304,6 +304,16 @@ def test_every_run_is_the_same_as_alone(here, done, monkeypatch):
     assert re.fullmatch(r"4 of 4 runs are finished, \d+\.\d min", summary)
     assert report.startswith("Report: ")
     assert report.endswith(" -m evolution.report out")
+
+
+def test_a_run_that_was_packed_at_once_has_its_scores_in_its_line(finished):
+    path = running(finished, "one", 1)
+    job = Job("one", load_config(path / "config.yaml"), path, (), finished)
+    before = module._line(job)
+    assert "held-out epuck " in before
+    assert pack(StudyDirectory(finished)).packed
+    assert not path.exists()
+    assert module._line(job) == before
 
 
 def test_what_is_done_is_skipped(finished, carried, capsys):

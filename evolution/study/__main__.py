@@ -240,11 +240,21 @@ def _shown(
 def _line(job: Job) -> str:
     """Line that shows the scores of a finished run."""
     path = job.run.champion
-    if not files.is_file(path):
-        # another process has packed it
+    if files.is_file(path):
+        _, scores = read_champion(path)
+        return f"{job}: {scores.in_short}"
+    # packed since then, with another one or by another process
+    if job.study is None:
         return str(job)
-    _, scores = read_champion(path)
-    return f"{job}: {scores.in_short}"
+    from evolution.study.addresses import run_at
+    from evolution.study.packed_run import PackedRun
+
+    packed = run_at(job.study / job.name / job.directory.name)
+    return (
+        f"{job}: {packed.scores.in_short}"
+        if isinstance(packed, PackedRun)
+        else str(job)
+    )
 
 
 if __name__ == "__main__":
