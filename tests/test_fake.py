@@ -4,9 +4,9 @@ import math
 import os
 import re
 import signal
+import socket
 import subprocess
 import threading
-import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
