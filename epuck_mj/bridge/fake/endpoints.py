@@ -136,8 +136,9 @@ class Tcp:
         if not self.is_open:
             return
         self.is_open = False
-        self._drop()
+        # first: who notices the loss and connects again at once is refused
         self._server.close()
+        self._drop()
 
     def handles(self) -> list[int]:
         """See Pty."""
