@@ -66,14 +66,18 @@ STRATEGIES: Mapping[str, Strategy] = {"best": best_1, "rand": rand_1}
 
 
 def binomial_crossover(
-    parents: np.ndarray, mutants: np.ndarray, crossover: float, rng: Generator
+    parents: np.ndarray,
+    mutants: np.ndarray,
+    crossover: float | np.ndarray,
+    rng: Generator,
 ) -> np.ndarray:
     """Trials `(population, genes)`: mutant where rand_j < CR or j = R, else parent.
 
     Args:
         parents: `(population, genes)`.
         mutants: `(population, genes)`.
-        crossover: CR; 0 takes the one gene R from the mutant, 1 takes all.
+        crossover: CR, of all or of each `(population, 1)`; 0 takes the one gene R from
+            the mutant, 1 takes all.
         rng: draws R `(population,)`, then rand `(population, genes)`.
     """
     population, genes = parents.shape

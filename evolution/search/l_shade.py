@@ -31,6 +31,8 @@ from numpy.typing import ArrayLike
 from epuck_mj.host.limits import check
 from evolution.search.ask_tell import Optimizer, read_only
 from evolution.search.bounds import midpoint
+from evolution.search.differential_evolution import binomial_crossover
+from evolution.search.random_search import best_of
 from evolution.search.search_space import SearchSpace
 
 # N_min: x, r1, r2 and one more
@@ -241,10 +243,7 @@ class LShade(Optimizer):
         space = self._space
         mutants = midpoint(mutants, genomes, space.lower, space.upper, rng)
         # equation (5)
-        forced = rng.integers(space.genes, size=n)
-        from_mutant = rng.random(genomes.shape) < self._cr[:, np.newaxis]
-        from_mutant[np.arange(n), forced] = True
-        return np.where(from_mutant, mutants, genomes)
+        return binomial_crossover(genomes, mutants, self._cr[:, np.newaxis], rng)
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Let trials replace parents unless they are worse; learn from the better."""
@@ -282,8 +281,7 @@ class LShade(Optimizer):
         size = reduced_size(parameters.population, self._evaluations, parameters.budget)
         if size >= len(self.population):
             return
-        # of equals the first stay
-        kept = np.sort(np.argsort(-self.fitness, kind="stable")[:size])
+        kept = best_of(self.fitness, size)
         self.population = read_only(self.population[kept])
         self.fitness = read_only(self.fitness[kept])
         capacity = self._capacity(size)
