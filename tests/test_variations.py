@@ -11,6 +11,7 @@ from evolution.judging.scores import HeldOut, Scores
 from evolution.settings.config_files import find_config, load_config
 from evolution.statistics.significance import holm
 from evolution.study.data import RunData, StudyData
+from evolution.study.pack import pack_studies
 from evolution.variations import __main__ as module
 from evolution.variations.__main__ import report_variations
 from evolution.variations.varied import UNCHANGED, orders, varied_of
@@ -137,6 +138,14 @@ def test_the_command_writes_page_and_figure(tmp_path, monkeypatch, capsys):
     before = (out / "variations.md").read_bytes()
     report_variations(["here", "--output", str(out)])
     assert (out / "variations.md").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "command", [pack_studies, lambda argv: report_variations(["--output", "out"])]
+)
+def test_no_study_at_all_is_refused(command):
+    with pytest.raises(UserError, match="expected study directories"):
+        command([])
 
 
 def test_studies_of_other_algorithms_are_refused(tmp_path, monkeypatch):

@@ -124,8 +124,17 @@ def check_provenance(fields: Mapping[str, Any], path: Path) -> None:
     Raises:
         UserError: if a value is something else.
     """
+    check_fields(_Provenance, fields, path)
+
+
+def check_fields(kind: type[BaseModel], fields: Mapping[str, Any], path: Path) -> None:
+    """Refuse fields of a file that are not of a kind.
+
+    Raises:
+        UserError: naming the first value that is something else.
+    """
     try:
-        _Provenance.model_validate(fields)
+        kind.model_validate(fields)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))

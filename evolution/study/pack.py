@@ -8,6 +8,7 @@ from typing import Annotated
 
 import tyro
 
+from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse, word
 from evolution.study.directory import StudyDirectory
 
@@ -29,8 +30,14 @@ class Options:
 
 
 def pack_studies(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status, 1 if a finished run is in no table."""
+    """Run the command line; its exit status, 1 if a finished run is in no table.
+
+    Raises:
+        UserError: if no study is named, or one is none.
+    """
     options = parse(Options, "python -m evolution.study.pack", argv, examples=EXAMPLES)
+    if not options.studies:
+        raise UserError("expected study directories")
     studies = [StudyDirectory(path) for path in options.studies]
     for study in studies:
         # said before any work

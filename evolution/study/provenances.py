@@ -13,12 +13,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
-from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.yaml_and_json import read_json
-from evolution.run.provenance import check_provenance
+from evolution.run.provenance import check_fields, check_provenance
 
 THREADS, COMMANDS = "threads", "commands"
 """What may differ between runs of one provenance: lists of all that were used.
@@ -102,12 +101,7 @@ def read_provenances(path: Path) -> dict[str, dict[str, Any]]:
     if not files.is_file(path):
         return {}
     fields = read_json(path)
-    try:
-        _Provenances.model_validate(fields)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise UserError(f"'{path}' is damaged: {where}: {first['msg']}") from None
+    check_fields(_Provenances, fields, path)
     for entry in fields["provenances"]:
         check_provenance(entry, path)
     return {entry["id"]: entry for entry in fields["provenances"]}

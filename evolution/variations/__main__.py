@@ -41,7 +41,7 @@ def report_variations(argv: Sequence[str]) -> int:
         VariationsOptions, "python -m evolution.variations", argv, examples=EXAMPLES
     )
     if not options.studies:
-        raise UserError("expected at least one study")
+        raise UserError("expected study directories")
     # slow to import
     from epuck_mj.host import files
     from evolution.pages.blocks import (

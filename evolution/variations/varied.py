@@ -8,6 +8,7 @@ import numpy as np
 
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.pages.words import PAPERS
+from evolution.report.sections.comparisons import MARGIN
 from evolution.reproduce.claims import REPLICATES
 from evolution.reproduce.verdicts import chance_of_order
 from evolution.statistics.equivalence import Equivalence, equivalence
@@ -21,9 +22,6 @@ from evolution.study.data import StudyData
 
 UNCHANGED = "unchanged"
 """Name of what is not varied."""
-
-MARGIN = 1 / 30
-"""Margin of equivalence as a share of the most that a trial can earn: 10 of 300."""
 
 
 @dataclass(frozen=True, eq=False)
