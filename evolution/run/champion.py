@@ -118,14 +118,14 @@ def choose_champion(
         engine: of the robot that evolution began with.
         evolution: whose setting is that of the trials.
         stored: whose candidates they are.
-        wheels: engine of the robot on wheels, for finalists.
+        wheels: engine of the robot on wheels, for finalists; None if there are none.
     """
     config = evolution.config
     n = config.validation_starts
     if config.robot == KINEMATIC_ROBOT:
         second = max(n, N_SCREENING)
         rounds = [(engine, n, SCREENED), (engine, second, config.finalists)]
-        if config.finalists and wheels is not None:
+        if config.has_finalists and wheels is not None:
             rounds.append((wheels, n, 1))
     else:
         rounds = [(engine, math.ceil(n * FIRST_SHARE), SCREENED), (engine, n, 1)]

@@ -133,10 +133,10 @@ def _chosen(
     evolution: Evolution, stored: Stored, on_wheels: Scene, threads: int
 ) -> Champion:
     """The champion; its engines, of hundreds of megabytes, end with the choice."""
-    engine, wheels = (
-        BatchEngine(scene, evolution.config.task, threads)
-        for scene in (evolution.scene, on_wheels)
-    )
+    config, wheels = evolution.config, None
+    engine = BatchEngine(evolution.scene, config.task, threads)
+    if config.has_finalists:
+        wheels = BatchEngine(on_wheels, config.task, threads)
     return choose_champion(engine, evolution, stored, wheels)
 
 

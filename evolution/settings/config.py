@@ -164,6 +164,11 @@ class ExperimentConfig(BaseModel):
         return self.robot == KINEMATIC_ROBOT and self.climb < 1
 
     @property
+    def has_finalists(self) -> bool:
+        """Whether the best on the kinematic robot are compared on wheels."""
+        return self.robot == KINEMATIC_ROBOT and self.finalists > 0
+
+    @property
     def conditions(self) -> Conditions:
         """Noise, randomisation and calibration of the robots."""
         return Conditions(self.noise, self.randomise, self.calibration)
