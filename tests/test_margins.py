@@ -190,11 +190,16 @@ def test_what_is_no_table_is_refused(tmp_path):
 def test_the_figure_has_a_line_for_each_experiment_and_change(tmp_path):
     figure = margins_figure(written(tmp_path / FILE), {"ga": "GA"}, 300)
     assert len(figure.axes) == 2 * len(CHANGES)
-    for axes, change in zip(figure.axes[: len(CHANGES)], CHANGES.values(), strict=True):
-        line = axes.lines[0]
-        np.testing.assert_array_equal(line.get_xdata(), change.amounts)
-        expected = [np.median(each.fitness) for each in margins()]
-        assert set(np.asarray(line.get_ydata()).tolist()) <= set(expected)
+    upper, lower = figure.axes[: len(CHANGES)], figure.axes[len(CHANGES) :]
+    for above, below, (name, change) in zip(upper, lower, CHANGES.items(), strict=True):
+        own = [each for each in margins() if each.change == name]
+        for axes, values in (
+            (above, [np.median(each.fitness) for each in own]),
+            (below, [np.median(each.crash_rate) for each in own]),
+        ):
+            line = axes.lines[0]
+            np.testing.assert_array_equal(line.get_xdata(), change.amounts)
+            np.testing.assert_array_equal(line.get_ydata(), values)
 
 
 def test_the_command_refuses_what_it_cannot_do(tmp_path):

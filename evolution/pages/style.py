@@ -174,4 +174,7 @@ def robot_panels(data: StudyData, rows: list[str]) -> tuple[Figure, list[Axes]]:
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.grid(visible=False, axis="y")
         axes.label_outer()
+    for axes in panels[1:]:
+        # beside a number in a bar, a tick looks like a minus
+        axes.tick_params(axis="y", length=0)
     return figure, panels

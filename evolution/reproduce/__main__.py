@@ -36,8 +36,8 @@ class ReproduceOptions:
     Attributes:
         quick: run three seeds with a twentieth of the budget, about a minute on two
             cores. Shows only that everything works.
-        full: run 100 seeds of the paper's algorithms and of all baselines, about 5
-            hours on two idle cores.
+        full: run 100 seeds of the paper's algorithms and of all baselines, some hours
+            on two idle cores.
         output: directory for everything that is written.
         study: run nothing and report this study directory instead.
         wheels: with --study, the study directory of the runs evolved on wheels.
@@ -60,7 +60,7 @@ def reproduce_paper(argv: Sequence[str]) -> int:
     if [options.quick, options.full, options.study is not None].count(True) != 1:
         raise UserError(
             "expected one of --quick (3 seeds, about a minute on two cores), --full "
-            "(100 seeds, about 5 hours on two idle cores) and --study (write the "
+            "(100 seeds, some hours on two idle cores) and --study (write the "
             "verdict on a study that is there)"
         )
     study_names = [each.name for each in (options.study, options.wheels) if each]

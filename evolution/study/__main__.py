@@ -48,7 +48,8 @@ class Options:
     are rows of champions.parquet and history.parquet.
 
     Attributes:
-        study: a shipped study (paper, wheels, transfer, quick) or a YAML file.
+        study: a shipped study (paper, variations, steps-150, steps-500, climbing,
+            wheels, transfer, quick) or a YAML file.
         output: study directory.
         seeds: seeds of the runs, such as 1-30 or 1,3,5-8.
         experiments: names of the experiments to run, separated by commas; all if not

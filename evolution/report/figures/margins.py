@@ -12,7 +12,14 @@ from matplotlib.ticker import MaxNLocator
 from epuck_mj.policies.wall_follower import YARDSTICK
 from evolution.margins.changed_robots import CHANGES
 from evolution.margins.margins_table import FILE, Margins, read_margins
-from evolution.pages.style import PAGE, PRINT, YARDSTICK_LOOK, legend_below, looks
+from evolution.pages.style import (
+    FEW,
+    PAGE,
+    PRINT,
+    YARDSTICK_LOOK,
+    legend_below,
+    looks,
+)
 from evolution.pages.words import YARDSTICK_LABEL, label
 from evolution.study.data import StudyData
 
@@ -24,17 +31,20 @@ def margins_of_study_figure(data: StudyData) -> tuple[Figure, str] | None:
         return None
     names = {name: label(data, name) for name in data.configs}
     names[YARDSTICK] = YARDSTICK_LABEL
+    shaded = len(margins.experiments) <= FEW
     caption = (
         "Champions on the kinematic robot when one number of the robot is changed: "
-        "medians over runs, with the quartiles of fitness shaded. Dotted: the robot "
-        "on which they evolved."
+        f"medians over runs{', with the quartiles of fitness shaded' * shaded}. "
+        "Dotted: the robot on which they evolved."
     )
     return margins_figure(margins, names, data.steps), caption
 
 
 @matplotlib.rc_context(PRINT)
 def margins_figure(margins: Margins, names: Mapping[str, str], most: int) -> Figure:
-    """Figure with a column per change; medians over runs, quartiles of fitness shaded.
+    """Figure with a column per change; medians over runs.
+
+    The quartiles of fitness are shaded unless there are many experiments.
 
     Args:
         margins: what was measured.
@@ -59,7 +69,8 @@ def margins_figure(margins: Margins, names: Mapping[str, str], most: int) -> Fig
                 amounts, fitness[:, 1], **style
             )[0]
             lower.plot(amounts, crashes, **style)
-            if found[0][1].size > 1:
+            # of many experiments, shades hide one another
+            if found[0][1].size > 1 and len(experiments) <= FEW:
                 shade = {"color": style["color"], "alpha": 0.12, "lw": 0}
                 upper.fill_between(amounts, fitness[:, 0], fitness[:, 2], **shade)
         for axes in (upper, lower):

@@ -226,7 +226,7 @@ def numbers(pair: Comparison) -> str:
         f"difference {pair.shift.value:z.1f} {between(pair.shift, '.1f')}; "
         f"A12 {pair.a12.value:.2f} {between(pair.a12)}; "
         f"p {probability(pair.p)}, Holm {probability(pair.p_holm)}; equivalent "
-        f"within {pair.equivalence.margin:g}: Holm p "
+        f"within {pair.equivalence.margin:.3g}: Holm p "
         f"{probability(pair.p_equivalence)}"
     )
 
