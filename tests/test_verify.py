@@ -18,14 +18,20 @@ from evolution.run.execution import Run
 from evolution.run.generation_loop import Evolution
 from evolution.run.means import Means
 from evolution.run.results import shown_trials
+from evolution.search.search_space import SearchSpace
+from evolution.search.table import make_optimizer
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from evolution.study.config import StudyConfig
 from evolution.verify.__main__ import verify
 from evolution.verify.differences import lines_of_differences
-from evolution.verify.rewritten import stored_without_checkpoint
+from evolution.verify.rewritten import (
+    largest_generation,
+    stored_without_checkpoint,
+)
 from evolution.verify.written import read_run
 from tests.no_pictures import draw_nothing
+from tests.shipped import OPTIMIZERS
 
 SAME = "1 of 1 runs are the same to the last bit"
 
@@ -182,6 +188,24 @@ def test_an_edited_champion(what, kind, request, tmp_path, capsys):
     lines = verdict(edited(run, tmp_path, "champion.json", change), capsys)
     assert any(words in line for line in lines), lines
     assert all(line.startswith("  champion.json, ") for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("name", "sizes", "expected"),
+    [
+        ("ga", [100, 100, 100], 100),
+        # restarts double it
+        ("cma-es", [15, 15, 30], 60),
+        ("lra-cma-es", [15, 15, 15], 15),
+        # parents are evaluated again from the second generation on
+        ("one-plus-one-es", [10, 20, 20], 20),
+        ("ssshc", [20, 40, 20], 40),
+    ],
+)
+def test_what_may_be_left_is_less_than_a_generation(name, sizes, expected):
+    space = SearchSpace(3, -5, 5, -5, 5)
+    optimizer = make_optimizer(OPTIMIZERS[name], space, np.random.default_rng(0))
+    assert largest_generation(np.cumsum(sizes), optimizer) == expected
 
 
 def last_row_less(text: str) -> str:

@@ -129,6 +129,9 @@ class Optimizer(ABC):
         generation: number of tells so far.
     """
 
+    growth = 1
+    """A generation has at most so many times as many genomes as any that have been."""
+
     def __init__(self, name: str, population: np.ndarray, rng: Generator) -> None:
         """Begin with genomes `(population, genes)` that have not been evaluated."""
         self.rng = rng

@@ -42,6 +42,9 @@ if TYPE_CHECKING:
 # With a single parent, half of 3, `cmaes` divides by a learning rate of 0.
 MIN_POPULATION = 4
 
+GROWTH = 2
+"""A restart has so many times as many individuals as the search before it."""
+
 
 def made_finite(fitness: np.ndarray) -> np.ndarray:
     """Fitness `(n,)` in the same order, without infinities.
@@ -106,6 +109,7 @@ class CmaEs(Optimizer):
         refuse_wide_steps(parameters.sigma, space)
         self._parameters = parameters
         self._space = space
+        self.growth = GROWTH if parameters.restarts else 1
         self.rng = rng
         # What the whole search follows from, together with what will be told.
         self._birth = generator_state(rng)
@@ -126,7 +130,7 @@ class CmaEs(Optimizer):
         self._told.append(told)
         self._history.append((told.max(), np.sort(told)[len(told) // 2]))
         if self._parameters.restarts and self._should_stop():
-            self._cma = self._started(2 * self._cma.population_size)
+            self._cma = self._started(GROWTH * self._cma.population_size)
         self.population, self.fitness = read_only(asked), read_only(told)
 
     def restore(self, state: Mapping[str, np.ndarray]) -> None:

@@ -30,6 +30,7 @@ from evolution.run.history import (
     timing_text,
 )
 from evolution.run.results import judged, shown_trials
+from evolution.search.ask_tell import Optimizer
 from evolution.settings.comparison import flat
 from evolution.verify.differences import lines_of_differences, said, unsaid
 from evolution.verify.written import Written
@@ -170,15 +171,27 @@ def _histories(written: Written, evolution: Evolution) -> Iterator[str]:
         name, best = CHAMPIONS, [max(best[int(climbed.argmax()) :])][: len(fitness)]
     yield from lines_of_differences(name, {"fitness": fitness}, {"fitness": best})
     spent, config = int(written.history["evaluations"][-1]), evolution.config
-    # an own optimiser's generations may differ in size
+    # nobody knows how large an own optimiser's generations may be
     own = is_own(config.optimizer.algorithm)
     left = config.evaluations - spent
-    if left < 0 or not (own or left < evolution.optimizer.next_size()):
+    most = largest_generation(written.history["evaluations"], evolution.optimizer)
+    if left < 0 or not (own or left < most):
         yield (
             f"{written.run.config.name}: evaluations {config.evaluations}, but "
             f"{'history.parquet' if written.packed else written.run.history.name} ends "
             f"with {spent}"
         )
+
+
+def largest_generation(evaluations: np.ndarray, optimizer: Optimizer) -> int:
+    """Most genomes that the generation after a history may have had.
+
+    Args:
+        evaluations: spent after each generation, `(generations,)`.
+        optimizer: of the run, after a few generations.
+    """
+    sizes = np.diff(evaluations, prepend=0)
+    return max(optimizer.next_size(), int(sizes.max()) * optimizer.growth)
 
 
 def stored_without_checkpoint(written: Written, evolution: Evolution) -> Stored:
