@@ -22,8 +22,16 @@ BASELINES = (
     "openai-es",
     "ssshc",
 )
+HYBRIDS = (
+    "de-best-then-cma-es",
+    "imitators-then-cma-es",
+    "memetic-de",
+    "lifetime-learning",
+)
+"""Hybrids; without lessons their individuals do not learn."""
 OPTIMIZERS = {
-    name: load_config(find_config(name)).optimizer for name in (*PAPERS, *BASELINES)
+    name: load_config(find_config(name)).optimizer
+    for name in (*PAPERS, *BASELINES, *HYBRIDS)
 }
 
 

@@ -16,6 +16,7 @@ from evolution.settings.config_files import (
     load_config,
     shipped_experiments,
 )
+from tests.shipped import HYBRIDS
 
 # Source: paper, section 4; what it leaves open: paper notes, section 3
 PAPERS = {
@@ -118,6 +119,8 @@ ON_REAL_ROBOTS = {
     "ga-randomised": ("ga", RANDOMISED),
 }
 """The paper's again, under disturbances."""
+ALL = sorted([*SHIPPED, *ON_REAL_ROBOTS, *HYBRIDS, "policy-gradient"])
+
 every_experiment = pytest.mark.parametrize("name", SHIPPED)
 COMMON = {
     "seed": 1,
@@ -189,7 +192,7 @@ DE = {
 
 
 def test_exactly_these_experiments_are_shipped():
-    assert list(shipped_experiments()) == sorted([*SHIPPED, *ON_REAL_ROBOTS])
+    assert list(shipped_experiments()) == ALL
 
 
 @pytest.mark.parametrize("name", ON_REAL_ROBOTS)
@@ -438,11 +441,38 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path):
 
 def test_unknown_experiment_is_refused_with_the_shipped_ones(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    available = ", ".join(sorted([*SHIPPED, *ON_REAL_ROBOTS]))
+    available = ", ".join(ALL)
     with pytest.raises(UserError, match=rf"no experiment 'de'.* one of {available}$"):
         find_config("de")
     with pytest.raises(UserError, match="no experiment"):
         find_config(".")
+
+
+@pytest.mark.parametrize(
+    ("evolution", "expected"),
+    [
+        (None, "evolution: expected a mapping with 'algorithm'"),
+        ({"algorithm": "ga"}, "one of differential_evolution, got 'ga'"),
+        ({"scal": 1.0}, "evolution: unknown key 'scal'; available: strategy, popul"),
+        ({"population": "many"}, "evolution: population: expected a whole number"),
+        ({"population": 2}, "population: expected a whole number from 4 to "),
+    ],
+)
+def test_a_part_of_an_optimizer_is_checked(evolution, expected):
+    fields = load_config(find_config("memetic-de")).model_dump()
+    part = fields["optimizer"]["evolution"]
+    changed = {} if evolution is None else part | evolution
+    fields["optimizer"]["evolution"] = changed
+    with pytest.raises(UserError) as refused:
+        ExperimentConfig.parsed(fields, "mine")
+    assert expected in str(refused.value)
+
+
+@pytest.mark.parametrize("name", [*HYBRIDS, "policy-gradient"])
+def test_hybrids_come_back_from_their_yaml(name):
+    config = load_config(find_config(name))
+    assert ExperimentConfig.from_yaml(config.to_yaml(), "mine") == config
+    assert config.budget == 150_000
 
 
 def test_an_own_file_is_found_by_its_path(config_file):

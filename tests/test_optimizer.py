@@ -18,21 +18,45 @@ from evolution.search.properties import (
     sphere,
 )
 from evolution.search.random_search import RandomSearch, RandomSearchParameters
+from evolution.search.sequence import SequenceParameters
 from evolution.search.table import (
     ALGORITHMS,
     Optimizer,
     SearchSpace,
     make_optimizer,
 )
-from tests.shipped import BASELINES, OPTIMIZERS, PAPERS
+from tests.shipped import BASELINES, HYBRIDS, OPTIMIZERS, PAPERS
 
 BEST, RAND, GA = (OPTIMIZERS[name] for name in PAPERS)
 
 RANDOM, ES, CMA, LRA, LSHADE, OPENAI, SSSHC = (OPTIMIZERS[name] for name in BASELINES)
+SEQUENCE, IMITATED, MEMETIC, LEARNING = (OPTIMIZERS[name] for name in HYBRIDS)
 VARIANTS = {
     **OPTIMIZERS,
     # a run fills in its evaluations
     "l-shade": replace(LSHADE, budget=30_000),
+    "de-best-then-cma-es": replace(SEQUENCE, budget=1000),
+    "imitators-then-cma-es": replace(IMITATED, budget=1000),
+    "small de-best then cma-es": replace(
+        SEQUENCE, first=replace(BEST, population=20), budget=100
+    ),
+    "de-best then de-rand": SequenceParameters(
+        replace(BEST, population=20), replace(RAND, population=20), budget=200
+    ),
+    "cma-es then de-rand": SequenceParameters(
+        replace(CMA, restarts=False, population=20),
+        replace(RAND, population=20, reevaluate_best=3),
+        share=0.5,
+        budget=200,
+    ),
+    "memetic-de narrow": replace(MEMETIC, refinements=1, sigma=0.1),
+    "memetic-de, the best reevaluated": replace(
+        MEMETIC, evolution=replace(BEST, reevaluate_best=10)
+    ),
+    "baldwinian": replace(LEARNING, inheritance="baldwinian"),
+    "learning, parents reevaluated": replace(
+        LEARNING, evolution=replace(BEST, reevaluate_parents=True)
+    ),
     "de-best reevaluated": replace(BEST, reevaluate_parents=True),
     "de-best, the best reevaluated": replace(BEST, reevaluate_best=10),
     "de-rand, all of them": replace(RAND, population=20, reevaluate_best=20),
@@ -79,7 +103,8 @@ def found(variant: str) -> float:
 
 
 def test_shipped_names_are_the_optimisers_own():
-    assert all(make(name).name == name for name in OPTIMIZERS)
+    alone = [name for name in OPTIMIZERS if name not in HYBRIDS]
+    assert all(make(name).name == name for name in alone)
 
 
 def test_algorithms_are_the_kinds_of_parameters_by_their_tags():
@@ -92,6 +117,11 @@ def test_algorithms_are_the_kinds_of_parameters_by_their_tags():
         "l_shade",
         "openai_es",
         "ssshc",
+        "memetic_de",
+        "sequence",
+        "imitators",
+        "lifetime_learning",
+        "policy_gradient",
     ]
     for parameters in OPTIMIZERS.values():
         assert ALGORITHMS[parameters.algorithm] is type(parameters)

@@ -24,7 +24,7 @@ from evolution.study.config import (
 from evolution.study.data import load_study
 from evolution.study.directory import StudyDirectory
 from tests.processes import PATIENCE
-from tests.shipped import OPTIMIZERS, PAPERS
+from tests.shipped import HYBRIDS, OPTIMIZERS, PAPERS
 
 ROBOTS = {"paper": "epuck_kinematic", "quick": "epuck_kinematic", "wheels": "epuck"}
 GA = "optimizer: {algorithm: genetic_algorithm}\n"
@@ -117,7 +117,7 @@ def test_shipped_studies_load(name):
 
 def test_the_papers_study_has_every_optimizer_and_one_rule_for_champions():
     experiments = StudyConfig.load(find_study("paper")).experiments
-    assert set(OPTIMIZERS) < set(experiments)
+    assert set(OPTIMIZERS) - set(HYBRIDS) < set(experiments)
     for name, each in experiments.items():
         assert (each.climb, each.finalists, each.validation_starts) == (1, 0, 200)
         assert each.test_starts == (1000 if name in PAPERS else 200)
@@ -146,6 +146,19 @@ def test_a_variation_differs_in_one_thing_from_its_algorithm(study):
         assert varied.budget == config.budget
     names = set(experiments) - set(PAPERS)
     assert study != "variations" or len(names) >= 60
+
+
+def test_hybrids_cost_the_same_and_are_tested_alike():
+    experiments = StudyConfig.load(find_study("hybrids")).experiments
+    assert {config.budget for config in experiments.values()} == {150_000}
+    assert {config.setting for config in experiments.values()} == {
+        experiments["de-best"].setting
+    }
+    # a rule and the control of it differ in nothing else
+    for share in ("", "-10", "-60"):
+        control = experiments[f"perturbation{share}"]
+        learnt = experiments[f"imitation{share}"]
+        assert set(differences({"a": control, "b": learnt})) == {"optimizer.rule"}
 
 
 def test_climbing_is_de_best():
@@ -273,8 +286,8 @@ def test_a_study_is_shipped_or_a_file(here):
         message = refused(find_study, name)
         assert message.startswith(f"no study '{name}'")
         assert message.endswith(
-            "one of climbing, paper, quick, steps-150, steps-500, transfer, "
-            "variations, wheels"
+            "one of climbing, hybrids, paper, quick, steps-150, steps-500, "
+            "transfer, variations, wheels"
         )
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import tyro
+from tyro.constructors import PrimitiveConstructorSpec
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import loading
@@ -26,6 +27,20 @@ from epuck_mj.host.output import (
 )
 
 Options = TypeVar("Options")
+
+
+def _no_flag(words: list[str]) -> Any:
+    raise ValueError("no flag sets this: write an experiment of your own")
+
+
+PART = PrimitiveConstructorSpec(
+    nargs=1,
+    metavar="{fixed}",
+    instance_from_str=_no_flag,
+    is_instance=lambda value: True,
+    str_from_instance=lambda value: ["as in the experiment"],
+)
+"""Annotation of a part with parameters of its own, which only a file can set."""
 
 
 def word(metavar: str) -> Any:

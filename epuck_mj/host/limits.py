@@ -113,6 +113,13 @@ LIMITS: Mapping[str, Limit] = MappingProxyType(
         "weight_decay": SHARE,
         "stochasticity": SHARE,
         "refinements": Limit(0, 100_000),
+        # a lesson costs two evaluations: where all learn, two thirds are lessons
+        "learning_share": Limit(0, 2 / 3, whole=False),
+        "step": _above_0(1_000_000),
+        "exploration": _above_0(100),
+        "discount": SHARE,
+        "demonstrations": COUNT,
+        "batch": COUNT,
         # controller files
         "n_genes": COUNT,
         "n_state": Limit(0, 100_000),

@@ -107,10 +107,11 @@ class Controller:
 
         Source: paper, section 4. w is 2 sigmoid - 1, so that 0 drives straight on.
         """
-        action = half_tanh(_layer(self.activation(observation), self.output))
-        action[..., 0] += 1.0
-        action[..., 0] *= 0.5
-        return action
+        return squashed(self.sums(observation))
+
+    def sums(self, observation: np.ndarray) -> np.ndarray:
+        """Weighted sums of the output neurons `(..., 2)`, of which actions are made."""
+        return _layer(self.activation(observation), self.output)
 
     def activation(self, observation: np.ndarray) -> np.ndarray:
         """Output of the hidden neurons, `(..., hidden)` in [0, 1]."""
@@ -122,6 +123,14 @@ class Controller:
     def __getitem__(self, index: Any) -> "Controller":
         """The controllers at `index` of the batch, in numpy's sense."""
         return Controller(self.hidden[:, index], self.output[:, index])
+
+
+def squashed(sums: np.ndarray) -> np.ndarray:
+    """Actions `(..., 2)`: v in [0, 1], w in [-1, 1], of the output neurons' sums."""
+    action = half_tanh(sums)
+    action[..., 0] += 1.0
+    action[..., 0] *= 0.5
+    return action
 
 
 def _layer(inputs: np.ndarray, weights: np.ndarray) -> np.ndarray:

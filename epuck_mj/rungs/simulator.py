@@ -52,3 +52,24 @@ class CompiledTrials(Protocol):
                 `(n / per_individual,)`; -inf where it may not.
         """
         ...
+
+    def explored(
+        self,
+        controller: Controller,
+        starts: np.ndarray,
+        disturbances: Disturbances | None,
+        tried: np.ndarray,
+    ) -> tuple[Trials, np.ndarray, np.ndarray]:
+        """Trials `(n,)` of learners, what they observed and what each step earned.
+
+        Args:
+            controller: one per trial.
+            starts: poses `(n, 3)`: x, y [m], yaw [rad].
+            disturbances: of the trials; None for ideal robots.
+            tried: see `Exploring`, `(n, steps, 2)`.
+
+        Returns:
+            The trials, observations `(n, steps, 8)` at the beginning of each control
+            step, and step fitness `(n, steps)`; both are 0 after a trial's end.
+        """
+        ...

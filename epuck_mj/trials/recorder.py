@@ -102,6 +102,31 @@ def record_trajectories(
     return trajectories
 
 
+def record_lessons(
+    robots: Simulator,
+    policy: BatchPolicy,
+    starts: np.ndarray,
+    task: TaskParameters,
+    disturbances: Disturbances | None = None,
+) -> tuple[Trials, np.ndarray, np.ndarray]:
+    """Trials `(n,)`, what was observed and what each step earned.
+
+    Returns:
+        The trials, observations `(n, steps, 8)` at the beginning of each control step,
+        and step fitness `(n, steps)`; both are 0 after a trial's end.
+    """
+    n, steps = len(starts), task.steps
+    rows = {
+        "observation": np.zeros((n, steps + 1, N_PROXIMITY)),
+        "fitness": np.zeros((n, steps)),
+    }
+    trials = _recorded(robots, policy, starts, task, disturbances, rows)
+    # nothing is decided on what was seen at a trial's end
+    ends = np.arange(n), trials.steps
+    rows["observation"][ends] = 0.0
+    return trials, rows["observation"][:, :-1], rows["fitness"]
+
+
 def record(
     scene: Scene,
     policy: Policy,
@@ -161,7 +186,10 @@ class _Writer:
         reading: Reading,
         observation: np.ndarray,
     ) -> None:
-        self.rows["pose"][active, row] = self.robots.poses()
+        if "pose" in self.rows:
+            self.rows["pose"][active, row] = self.robots.poses()
+        if "observation" in self.rows:
+            self.rows["observation"][active, row] = observation
         if "distance" not in self.rows:
             return
         truth = reading.distance if reading.truth is None else reading.truth
@@ -170,5 +198,4 @@ class _Writer:
             counts = np.rint(proximity(truth))
         self.rows["distance"][active, row] = truth
         self.rows["proximity"][active, row] = counts
-        self.rows["observation"][active, row] = observation
         self.rows["contact"][active, row] = reading.contact

@@ -15,9 +15,16 @@ from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.disturbances import Disturbances
 from evolution.judging.evaluation import BatchEngine, DmControlEngine, Engine, evaluate
+from evolution.judging.lessons import (
+    Circumstances,
+    GivenLessons,
+    LessonRobots,
+    learnable,
+)
 from evolution.run.history import Record, history_text
 from evolution.search.l_shade import LShadeParameters
-from evolution.search.table import Optimizer, make_optimizer
+from evolution.search.sequence import SequenceParameters
+from evolution.search.table import AskTellError, Optimizer, make_optimizer
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.memory import check_needs
 from evolution.settings.randomness import Purpose, disturbances, random_generator
@@ -103,13 +110,17 @@ class Evolution:
         # that an individual can only lose shows only if fitness has a maximum
         self.racing = racing and config.task.step_fitness.maximum is not None
         self.optimizer = _optimizer(config)
+        self._threads = threads
+        self._lesson_scene, self._lesson_robots = self.scene, None
+        if self.optimizer.needs_lessons:
+            learnable(config.topology)
         self.records: list[Record] = []
         self.best_genomes: list[np.ndarray] = []
         """Best individual of the population after each generation, `(genes,)`."""
-        if self.optimizer.next_size() > config.evaluations:
+        if self.optimizer.next_cost() > config.evaluations:
             raise UserError(
                 f"expected a budget of at least one generation, "
-                f"{self.optimizer.next_size()} evaluations, got {config.evaluations}"
+                f"{self.optimizer.next_cost()} evaluations, got {config.evaluations}"
             )
 
     @property
@@ -131,15 +142,14 @@ class Evolution:
         """
         config = self.config
         due = self.evaluations >= config.climb * config.evaluations
-        size = len(self.optimizer.population) + self.optimizer.next_size()
+        size = len(self.optimizer.population) + self.optimizer.next_cost()
         fits = self.evaluations + size <= config.evaluations
         return config.climbs and not self.climbed and due and fits
 
     @property
     def finished(self) -> bool:
         """Whether the budget has no evaluations left for another generation."""
-        size = self.optimizer.next_size()
-        return self.evaluations + size > self.config.evaluations
+        return self.evaluations + self.optimizer.next_cost() > self.config.evaluations
 
     def run(self) -> Iterator[Record]:
         """Evolve until the budget is spent; one record per generation."""
@@ -149,6 +159,7 @@ class Evolution:
     def climb(self) -> None:
         """Run all further trials on wheels."""
         self.engine = self._maker(self._wheels)
+        self._lesson_scene, self._lesson_robots = self._wheels, None
 
     def release(self) -> None:
         """Free the simulated robots, hundreds of megabytes, once all is evolved."""
@@ -168,7 +179,17 @@ class Evolution:
             self.optimizer.judge_anew(anew.fitness)
             spent += len(known)
             evaluations.append(anew)
-        genomes = self.optimizer.ask()
+        cost = self.optimizer.next_cost()
+        genomes, lessons = self.optimizer.ask(), None
+        if cost > len(genomes):
+            lessons = self._lessons(generation)
+            self.optimizer.learn_in_life(lessons)
+            genomes = self.optimizer.pending()
+            if lessons.cost != cost - len(genomes):
+                raise AskTellError(
+                    f"expected lessons of {cost - len(genomes)} evaluations, "
+                    f"got {lessons.cost}"
+                )
         to_beat = self.optimizer.to_beat() if self.racing else None
         starts = self.starts(generation, len(genomes))
         evaluations.append(
@@ -180,17 +201,39 @@ class Evolution:
         fitness = np.where(np.isneginf(stored), 0.0, stored)
         record = Record(
             generation=generation,
-            evaluations=spent + len(genomes),
+            evaluations=spent + cost,
             best=float(fitness.max()),
             mean=float(fitness.mean()),
             std=float(fitness.std()),
-            control_steps=sum(int(each.steps.sum()) for each in evaluations),
+            control_steps=sum(int(each.steps.sum()) for each in evaluations)
+            + (lessons.control_steps if lessons else 0),
             crash_rate=float(np.concatenate([e.crashed for e in evaluations]).mean()),
             climbed=self.climbed or climbs,
         )
         self.records.append(record)
         self.best_genomes.append(self.optimizer.population[fitness.argmax()].copy())
         return record
+
+    def _lessons(self, generation: int) -> GivenLessons:
+        """The lessons of a generation, with starts and disturbances of their own."""
+        config = self.config
+        if self._lesson_robots is None:
+            self._lesson_robots = LessonRobots(
+                self._lesson_scene, config.task, self._threads
+            )
+
+        def circumstances(number: int, trials: int) -> Circumstances:
+            key = (Purpose.LESSONS, generation, number)
+            rng = random_generator(config.seed, *key)
+            starts = self.space.sample(rng, trials)
+            met = disturbances(
+                config.conditions, trials, config.steps, config.seed, *key
+            )
+            return Circumstances(starts, met, rng)
+
+        return GivenLessons(
+            self._lesson_robots, config.topology, circumstances, config.trials
+        )
 
     def starts(self, generation: int, individuals: int) -> np.ndarray:
         """Starts of a generation, the same for every algorithm of that seed.
@@ -283,7 +326,8 @@ def _optimizer(config: ExperimentConfig) -> Optimizer:
     """The optimiser at generation 0."""
     rng = random_generator(config.seed, Purpose.SEARCH)
     parameters = config.optimizer
-    if isinstance(parameters, LShadeParameters) and not parameters.budget:
+    budgeted = isinstance(parameters, LShadeParameters | SequenceParameters)
+    if budgeted and not parameters.budget:
         parameters = replace(parameters, budget=config.evaluations)
     try:
         return make_optimizer(parameters, config.search_space, rng)

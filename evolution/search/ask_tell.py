@@ -14,6 +14,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike
 
+from evolution.search.lessons import Lessons
+
 
 class AskTellError(RuntimeError):
     """An optimiser was called out of turn or told a fitness of the wrong shape."""
@@ -111,6 +113,16 @@ def checked_state(
     return arrays
 
 
+def part_of(state: Mapping[str, np.ndarray], name: str) -> dict[str, np.ndarray]:
+    """The state of the optimiser of that name inside of another's state."""
+    prefix = f"{name}."
+    return {
+        key.removeprefix(prefix): array
+        for key, array in state.items()
+        if key.startswith(prefix)
+    }
+
+
 class Optimizer(ABC):
     """A population-based maximiser that asks for fitness and is told.
 
@@ -130,7 +142,10 @@ class Optimizer(ABC):
     """
 
     growth = 1
-    """A generation has at most so many times as many genomes as any that have been."""
+    """A generation costs at most so many times as much as any that has been."""
+
+    needs_lessons = False
+    """Whether it wants lessons, which only the paper's network can be given."""
 
     def __init__(self, name: str, population: np.ndarray, rng: Generator) -> None:
         """Begin with genomes `(population, genes)` that have not been evaluated."""
@@ -157,6 +172,19 @@ class Optimizer(ABC):
     def next_size(self) -> int:
         """Number of genomes that the next ask returns."""
         return len(self.population)
+
+    def next_cost(self) -> int:
+        """Number of evaluations that the next generation costs, with its lessons."""
+        return self.next_size()
+
+    def learn_in_life(self, lessons: Lessons) -> None:  # noqa: B027
+        """Let genomes asked learn before they are evaluated; here, none does.
+
+        Those that do are changed in what waits for its fitness, see `pending`.
+
+        Args:
+            lessons: that may cost `next_cost() - next_size()` evaluations.
+        """
 
     def ask(self) -> np.ndarray:
         """Genomes to evaluate `(next_size(), genes)`, as a copy.
@@ -190,6 +218,26 @@ class Optimizer(ABC):
         self.learn(asked, checked_fitness(fitness, len(asked)))
         self.generation += 1
         self._asked = None
+
+    def begin_with(self, population: np.ndarray, fitness: np.ndarray) -> None:
+        """Go on from individuals of another search, as if they had just been told.
+
+        Args:
+            population: genomes `(n, genes)`, as many as it has itself.
+            fitness: theirs, `(n,)`.
+
+        Raises:
+            AskTellError: it has begun, or these are not as many.
+        """
+        self._refuse_pending("begin with others")
+        if self.generation or population.shape != self.population.shape:
+            raise AskTellError(
+                f"expected {len(self.population)} individuals to begin with, before "
+                f"the first generation, got {len(population)} in generation "
+                f"{self.generation}"
+            )
+        self.learn(population.copy(), checked_fitness(fitness, len(population)))
+        self.generation = 1
 
     def judge_anew(self, fitness: ArrayLike) -> None:
         """Replace the stored fitness of the population `(population,)`; NaN is -inf.
@@ -249,6 +297,10 @@ class Optimizer(ABC):
             "generator": generator_state(self.rng),
         }
 
+    def arrays_inside(self, name: str) -> dict[str, np.ndarray]:
+        """Arrays of the state as part of another optimiser's; see `part_of`."""
+        return {f"{name}.{key}": array for key, array in self.arrays().items()}
+
     def pending(self) -> np.ndarray:
         """The genomes `(n, genes)` that wait for their fitness.
 
@@ -258,6 +310,18 @@ class Optimizer(ABC):
         if self._asked is None:
             raise AskTellError("nothing to tell: expected ask() first")
         return self._asked
+
+    def replace_pending(self, genomes: np.ndarray) -> None:
+        """Put others in the place of the genomes that wait for their fitness.
+
+        Raises:
+            AskTellError: there are none, or not as many.
+        """
+        if genomes.shape != self.pending().shape:
+            raise AskTellError(
+                f"expected genomes of shape {self.pending().shape}, got {genomes.shape}"
+            )
+        self._asked = read_only(genomes)
 
     def _refuse_pending(self, action: str) -> None:
         """Refuse an action while genomes wait for their fitness.

@@ -28,12 +28,14 @@ from numpy.random import Generator
 
 from epuck_mj.host.limits import check
 from evolution.search.ask_tell import (
+    AskTellError,
     Optimizer,
     checked_state,
     generator_state,
     read_only,
     restored_generator,
 )
+from evolution.search.random_search import best_of
 from evolution.search.search_space import SearchSpace, refuse_wide_steps
 
 if TYPE_CHECKING:
@@ -41,6 +43,12 @@ if TYPE_CHECKING:
 
 # With a single parent, half of 3, `cmaes` divides by a learning rate of 0.
 MIN_POPULATION = 4
+
+ELITES = 10
+"""Individuals of another search whose spread is a search's first step. Chosen."""
+
+LEAST_STEP = 0.05
+"""Least first step size there. Chosen: 0.5 % of the paper's bounds."""
 
 GROWTH = 2
 """A restart has so many times as many individuals as the search before it."""
@@ -113,6 +121,7 @@ class CmaEs(Optimizer):
         self.rng = rng
         # What the whole search follows from, together with what will be told.
         self._birth = generator_state(rng)
+        self._elite: tuple[np.ndarray, float] | None = None
         self._told = [np.empty(0)]
         self._cma = self._started(parameters.population)
         name = "lra-cma-es" if parameters.learning_rate_adaptation else "cma-es"
@@ -133,6 +142,30 @@ class CmaEs(Optimizer):
             self._cma = self._started(GROWTH * self._cma.population_size)
         self.population, self.fitness = read_only(asked), read_only(told)
 
+    def begin_with(self, population: np.ndarray, fitness: np.ndarray) -> None:
+        """Start at the best of another search, of any size, with its elite's spread.
+
+        The first step size is the standard deviation of the genes of its best `ELITES`
+        individuals, `LEAST_STEP` at least and `sigma` at most. Nothing is as if told:
+        the first generation is its own.
+
+        Raises:
+            AskTellError: it has begun.
+        """
+        if self.generation:
+            raise AskTellError("cannot begin with others: it has begun")
+        spread = float(population[best_of(fitness, ELITES)].std(axis=0).mean())
+        sigma = min(max(spread, LEAST_STEP), self._parameters.sigma)
+        self._begin_at(population[np.argmax(fitness)], sigma)
+
+    def _begin_at(self, mean: np.ndarray, sigma: float) -> None:
+        """Replace the first search, which has told nothing, by one from there."""
+        self._elite = read_only(mean), sigma
+        self.rng = restored_generator(self.rng, self._birth)
+        self._cma = self._started(self._parameters.population, self._elite)
+        self._asked = None
+        self.population = read_only(self.propose())
+
     def restore(self, state: Mapping[str, np.ndarray]) -> None:
         """See `Optimizer.restore`.
 
@@ -142,9 +175,13 @@ class CmaEs(Optimizer):
         # As long as it is; all the rest is as in any other state.
         n_told = np.size(state["told"]) if "told" in state else 0
         like = {**self.arrays(), "told": np.empty(n_told)}
+        if "mean" in state and "sigma" in state:
+            like |= {"mean": np.empty(self._space.genes), "sigma": np.array(0.0)}
         arrays = checked_state(state, like=like)
         rng = restored_generator(self.rng, arrays["generator"])
         replayed = CmaEs(self._parameters, self._space, rng)
+        if "mean" in arrays:
+            replayed._begin_at(arrays["mean"], float(arrays["sigma"]))
         told, generations = arrays["told"], int(arrays["generation"])
         while len(told) >= replayed.next_size():
             n = replayed.next_size()
@@ -162,7 +199,10 @@ class CmaEs(Optimizer):
 
     def arrays(self) -> dict[str, np.ndarray]:
         """See `Optimizer.arrays`."""
-        return {
+        elite = {}
+        if self._elite is not None:
+            elite = {"mean": self._elite[0].copy(), "sigma": np.array(self._elite[1])}
+        return elite | {
             "name": np.array(self.name),
             "generation": np.array(self.generation),
             "told": np.concatenate(self._told),
@@ -178,18 +218,22 @@ class CmaEs(Optimizer):
         recent = np.array(self._history[-window:])
         return self._cma.should_stop() or has_stagnated(recent, window)
 
-    def _started(self, population: int) -> "CMA":
-        """A new search with this population at a random mean."""
+    def _started(
+        self, population: int, elite: tuple[np.ndarray, float] | None = None
+    ) -> "CMA":
+        """A new search with this population, at a random mean if at no elite's."""
         # with scipy behind it: for those who use it
         from evolution.search.symmetric_cma import SymmetricCma
 
         # fitness of the best and of the median individual of each of its generations
         self._history: list[tuple[float, float]] = []
-        space = self._space
+        space, sigma = self._space, self._parameters.sigma
         mean = self.rng.uniform(space.init_lower, space.init_upper, size=space.genes)
+        if elite is not None:
+            mean, sigma = elite
         return SymmetricCma(
-            mean=mean,
-            sigma=self._parameters.sigma,
+            mean=np.array(mean),
+            sigma=sigma,
             bounds=np.tile([space.lower, space.upper], (space.genes, 1)),
             seed=int(self.rng.integers(2**32)),
             population_size=population,

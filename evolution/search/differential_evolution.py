@@ -219,6 +219,22 @@ class DifferentialEvolution(Optimizer):
             return told
         return running_mean(self.fitness[again], self._evaluations[again], told)
 
+    def replace(
+        self, who: np.ndarray, genomes: np.ndarray, fitness: np.ndarray
+    ) -> None:
+        """Replace individuals by others, between two generations.
+
+        Args:
+            who: indices `(n,)`.
+            genomes: `(n, genes)`.
+            fitness: theirs, of one evaluation each, `(n,)`.
+        """
+        self._refuse_pending("replace")
+        population, stored = self.population.copy(), self.fitness.copy()
+        population[who], stored[who] = genomes, fitness
+        self.population, self.fitness = read_only(population), read_only(stored)
+        self._evaluations[who] = 1
+
     def judge_anew(self, fitness: ArrayLike) -> None:
         """See `Optimizer.judge_anew`: means begin again."""
         super().judge_anew(fitness)

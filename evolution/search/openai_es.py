@@ -32,14 +32,9 @@ import numpy as np
 from numpy.random import Generator
 
 from epuck_mj.host.limits import check
+from evolution.search.adam import Adam
 from evolution.search.ask_tell import Optimizer, read_only
 from evolution.search.search_space import SearchSpace, refuse_wide_steps
-
-BETAS = np.array([0.9, 0.999])
-"""Adam's decay rates of its first and second moment."""
-
-EPSILON = 1e-8
-"""What Adam adds to a root that may be 0."""
 
 
 def centred_ranks(fitness: np.ndarray) -> np.ndarray:
@@ -127,10 +122,7 @@ class OpenAiEs(Optimizer):
         self._parameters = parameters
         self._space = space
         self._centre = np.zeros(space.genes)
-        # Adam's: mean of the gradient and of its square, and both rates to the power
-        # of the number of steps
-        self._moments = np.zeros((2, space.genes))
-        self._powers = np.ones(2)
+        self._adam = Adam((space.genes,))
 
     def propose(self) -> np.ndarray:
         """Pairs around the centre, and the centre `(2 * pairs + 1, genes)`."""
@@ -154,32 +146,22 @@ class OpenAiEs(Optimizer):
             parameters.sigma,
         )
         gradient -= parameters.weight_decay * self._centre
-        step = parameters.learning_rate * self._adam(gradient)
+        step = parameters.learning_rate * self._adam.step(gradient)
         self._centre = self._clipped(self._centre + step)
 
     def load(self, arrays: Mapping[str, np.ndarray]) -> None:
         """See `Optimizer.load`."""
         super().load(arrays)
         self._centre = arrays["centre"]
-        self._moments, self._powers = arrays["moments"], arrays["powers"]
+        self._adam.load(arrays)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """See `Optimizer.arrays`."""
         return {
             **super().arrays(),
             "centre": self._centre.copy(),
-            "moments": self._moments.copy(),
-            "powers": self._powers.copy(),
+            **self._adam.arrays(),
         }
-
-    def _adam(self, gradient: np.ndarray) -> np.ndarray:
-        """Adam's step `(genes,)` of step size 1, up along `gradient` `(genes,)`."""
-        betas = BETAS[:, np.newaxis]
-        new = np.stack([gradient, gradient * gradient])
-        self._moments = betas * self._moments + (1 - betas) * new
-        self._powers = self._powers * BETAS
-        mean, square = self._moments / (1 - self._powers)[:, np.newaxis]
-        return mean / (np.sqrt(square) + EPSILON)
 
     def _clipped(self, genomes: np.ndarray) -> np.ndarray:
         """Genomes `(..., genes)` with genes outside the bounds moved to these."""

@@ -2,7 +2,8 @@
 
 Only this module imports all algorithms, which are one module each. They share
 `ask_tell` and `search_space`. The baselines beside the paper's are random search,
-(1+1)-ES, CMA-ES, L-SHADE, OpenAI-ES and SSSHC.
+(1+1)-ES, CMA-ES, L-SHADE, OpenAI-ES and SSSHC. Hybrids are memetic DE, a sequence of
+two searches, imitators and lifetime learning; policy gradient is without evolution.
 
     optimizer = make_optimizer(config.optimizer, config.search_space, rng)
     while spent + optimizer.next_size() <= budget:
@@ -34,10 +35,18 @@ from evolution.search.genetic_algorithm import (
     GeneticAlgorithm,
     GeneticAlgorithmParameters,
 )
+from evolution.search.imitators import Imitators, ImitatorsParameters
 from evolution.search.l_shade import LShade, LShadeParameters
+from evolution.search.lifetime_learning import (
+    LifetimeLearning,
+    LifetimeLearningParameters,
+)
+from evolution.search.memetic_de import MemeticDe, MemeticDeParameters
 from evolution.search.openai_es import OpenAiEs, OpenAiEsParameters
+from evolution.search.policy_gradient import PolicyGradient, PolicyGradientParameters
 from evolution.search.random_search import RandomSearch, RandomSearchParameters
 from evolution.search.search_space import SearchSpace
+from evolution.search.sequence import Sequence, SequenceParameters
 from evolution.search.ssshc import Ssshc, SsshcParameters
 
 __all__ = [
@@ -59,6 +68,11 @@ OptimizerParameters = (
     | LShadeParameters
     | OpenAiEsParameters
     | SsshcParameters
+    | MemeticDeParameters
+    | SequenceParameters
+    | ImitatorsParameters
+    | LifetimeLearningParameters
+    | PolicyGradientParameters
 )
 
 Maker = Callable[[Any, SearchSpace, Generator], Optimizer]
@@ -72,6 +86,11 @@ MAKERS: Mapping[type[OptimizerParameters], Maker] = {
     LShadeParameters: LShade,
     OpenAiEsParameters: OpenAiEs,
     SsshcParameters: Ssshc,
+    MemeticDeParameters: MemeticDe,
+    SequenceParameters: Sequence,
+    ImitatorsParameters: Imitators,
+    LifetimeLearningParameters: LifetimeLearning,
+    PolicyGradientParameters: PolicyGradient,
 }
 
 ALGORITHMS: Mapping[str, type[OptimizerParameters]] = {

@@ -1,19 +1,28 @@
 """Types of the keys of a configuration that are more than numbers."""
 
+from collections.abc import Sequence
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, get_args, get_type_hints
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    TypeAdapter,
+    ValidationError,
+)
 from pydantic_core import InitErrorDetails, PydanticCustomError
 from tyro.constructors import PrimitiveConstructorSpec
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import word
-from epuck_mj.host.limits import LIMITS
+from epuck_mj.host.limits import LIMITS, shown
 from epuck_mj.host.own_parts import is_own
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.fitness import FORMULAS
 from evolution.search.table import ALGORITHMS, OptimizerParameters
+from evolution.settings.config_errors import one_line
 
 N_VALIDATION = 200
 """Default number of starts on which a champion is chosen."""
@@ -69,7 +78,41 @@ def _of_known_algorithm(value: Any) -> Any:
             f"expected a mapping with 'algorithm', one of {', '.join(ALGORITHMS)}, or "
             "my.py:Class"
         )
-    return _checked_types(ALGORITHMS[algorithm], value)
+    kind = ALGORITHMS[algorithm]
+    return _checked_types(kind, _with_parts(kind, value))
+
+
+def _with_parts(kind: type, value: Any) -> Any:
+    """Parameters of that kind, with those of its parts as objects.
+
+    Raises:
+        ValueError: naming a part that is not as expected.
+    """
+    if not isinstance(value, dict):
+        return value
+    made = dict(value)
+    for key, hint in get_type_hints(kind).items():
+        kinds = [each for each in get_args(hint) or (hint,) if is_dataclass(each)]
+        if kinds and isinstance(value.get(key), dict):
+            made[key] = _part(key, value[key], kinds)
+    return made
+
+
+def _part(key: str, value: dict, kinds: Sequence[Any]) -> Any:
+    """Parameters of an optimiser that is a part of another, of one of these kinds."""
+    by_name = {kind.algorithm: kind for kind in kinds}
+    algorithm = value.get("algorithm")
+    if algorithm not in list(by_name):
+        raise ValueError(
+            f"{key}: expected a mapping with 'algorithm', one of {', '.join(by_name)}, "
+            f"got {shown(algorithm)}"
+        )
+    kind = by_name[algorithm]
+    try:
+        return TypeAdapter(kind).validate_python(_checked_types(kind, value))
+    except ValidationError as error:
+        names = [each.name for each in fields(kind)]
+        raise ValueError(f"{key}: {one_line(error, names, kind)}") from None
 
 
 KINDS = {int: "a whole number", float: "a number", bool: "true or false"}

@@ -16,6 +16,7 @@ class Purpose(IntEnum):
     VALIDATION = 2
     TEST = 3
     DISTURBANCES = 4
+    LESSONS = 5
 
 
 def random_generator(seed: int, *key: int) -> np.random.Generator:

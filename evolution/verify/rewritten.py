@@ -191,7 +191,7 @@ def largest_generation(evaluations: np.ndarray, optimizer: Optimizer) -> int:
         optimizer: of the run, after a few generations.
     """
     sizes = np.diff(evaluations, prepend=0)
-    return max(optimizer.next_size(), int(sizes.max()) * optimizer.growth)
+    return max(optimizer.next_cost(), int(sizes.max()) * optimizer.growth)
 
 
 def stored_without_checkpoint(written: Written, evolution: Evolution) -> Stored:

@@ -104,6 +104,27 @@ class Noise(NamedTuple):
     latency: np.ndarray
 
 
+class Exploration(NamedTuple):
+    """What trials of learners try, and what of them is written down.
+
+    Attributes:
+        there: whether they explore.
+        tried: added to the weighted sums of v and w, `(n, steps, 2)`.
+        observation: at the beginning of each step, `(n, steps, 8)`; filled.
+        reward: step fitness, `(n, steps)`; filled.
+    """
+
+    there: bool
+    tried: np.ndarray
+    observation: np.ndarray
+    reward: np.ndarray
+
+
+NOTHING_TRIED = Exploration(
+    False, np.zeros((1, 1, 2)), np.zeros((1, 1, N_PROXIMITY)), np.zeros((1, 1))
+)
+
+
 @compiled(forceinline=True)
 def interpolate(x, xs, ys):
     """See `elementary.interpolate`."""
@@ -149,8 +170,8 @@ def motor(wheel):
 
 
 @compiled(forceinline=True)
-def act(hidden, output, trial, observation, neurons):
-    """Action v, w of the network of a trial; see `network.Controller`."""
+def act(hidden, output, trial, observation, neurons, more_v, more_w):
+    """Action v, w of the network of a trial; see `exploring.Exploring`."""
     n_in, n_hidden = observation.shape[0], neurons.shape[0]
     for j in range(n_hidden):
         total = observation[0] * hidden[0, trial, j]
@@ -167,7 +188,7 @@ def act(hidden, output, trial, observation, neurons):
     if output.shape[0] > n_hidden:
         v += output[n_hidden, trial, 0]
         w += output[n_hidden, trial, 1]
-    return (half_tanh(v) + 1.0) * 0.5, half_tanh(w)
+    return (half_tanh(v + more_v) + 1.0) * 0.5, half_tanh(w + more_w)
 
 
 @compiled(forceinline=True)
@@ -183,7 +204,17 @@ def observe(distance, sensor_range, observation):
 
 @compiled()
 def trial(
-    plan: Plan, task: Task, noise: Noise, which, hidden, output, i, states, lag, needed
+    plan: Plan,
+    task: Task,
+    noise: Noise,
+    exploration: Exploration,
+    which,
+    hidden,
+    output,
+    i,
+    states,
+    lag,
+    needed,
 ):
     """One trial: fitness, control steps, whether it crashed.
 
@@ -191,7 +222,8 @@ def trial(
         plan: robot and arena.
         task: what a trial is.
         noise: disturbances.
-        which: of these the trial meets.
+        exploration: of learners.
+        which: of the disturbances the trial meets.
         hidden: weights of all trials' networks, as in `Controller`.
         output: likewise.
         i: number of the trial among these.
@@ -234,9 +266,13 @@ def trial(
         observe(distance, task.sensor_range, observation)
     else:
         observe(truth, task.sensor_range, observation)
-    fitness = 0.0
+    fitness, more_v, more_w = 0.0, 0.0, 0.0
     for k in range(task.steps):
-        v, w = act(hidden, output, i, observation, neurons)
+        if exploration.there:
+            more_v, more_w = exploration.tried[i, k, 0], exploration.tried[i, k, 1]
+            for j in range(N_PROXIMITY):
+                exploration.observation[i, k, j] = observation[j]
+        v, w = act(hidden, output, i, observation, neurons, more_v, more_w)
         forward, turn = v * task.forward, w * task.turn
         left = min(max(forward + turn, -task.speed_max), task.speed_max)
         right = min(max(forward - turn, -task.speed_max), task.speed_max)
@@ -301,12 +337,15 @@ def trial(
             observe(distance, task.sensor_range, observation)
         turning = abs(w)
         if task.fitness == 0:
-            fitness += v * (1.0 - turning) * close
+            reward = v * (1.0 - turning) * close
         elif task.fitness == 1:
-            fitness += v * (1.0 - turning * close)
+            reward = v * (1.0 - turning * close)
         else:
             kept = min(nearest / SPACED_NEAR, close / (1.0 - SPACED_FAR), 1.0)
-            fitness += v * (1.0 - turning) * kept
+            reward = v * (1.0 - turning) * kept
+        fitness += reward
+        if exploration.there:
+            exploration.reward[i, k] = reward
         if fitness + (task.steps - 1 - k) * task.most < needed:
             return fitness, k + 1, False
     return fitness, task.steps, False
@@ -317,6 +356,7 @@ def trials(
     plan: Plan,
     task: Task,
     noise: Noise,
+    exploration: Exploration,
     of,
     hidden,
     output,
@@ -336,7 +376,8 @@ def trials(
         plan: robot and arena.
         task: what a trial is.
         noise: disturbances.
-        of: which of these each trial meets, `(n,)`.
+        exploration: of learners.
+        of: which of the disturbances each trial meets, `(n,)`.
         hidden: weights of all trials' networks, as in `Controller`.
         output: likewise.
         states: of the robots on their starts, `(n, N_STATE)`; changed.
@@ -357,7 +398,17 @@ def trials(
             rest = (per_individual - 1 - t) * task.steps * task.most
             needed = to_beat[individual] - total - rest
             fitness[i], steps[i], crashed[i] = trial(
-                plan, task, noise, of[i], hidden, output, i, states, lag, needed
+                plan,
+                task,
+                noise,
+                exploration,
+                of[i],
+                hidden,
+                output,
+                i,
+                states,
+                lag,
+                needed,
             )
             total += fitness[i]
             if total + rest < to_beat[individual]:
@@ -395,6 +446,37 @@ class FusedTrials:
         Raises:
             UserError: if the scene has no plan.
         """
+        work = controller, starts, disturbances, per_individual, to_beat
+        return self._run(*work, NOTHING_TRIED)
+
+    def explored(
+        self,
+        controller: Controller,
+        starts: np.ndarray,
+        disturbances: Disturbances | None,
+        tried: np.ndarray,
+    ) -> tuple[Trials, np.ndarray, np.ndarray]:
+        """See `CompiledTrials`.
+
+        Raises:
+            UserError: if the scene has no plan.
+        """
+        n, steps = len(starts), self._task.steps
+        shape = n, steps, N_PROXIMITY
+        made = Exploration(True, tried, np.zeros(shape), np.zeros((n, steps)))
+        never = np.full(n, -np.inf)
+        trials = self._run(controller, starts, disturbances, 1, never, made)
+        return trials, made.observation, made.reward
+
+    def _run(
+        self,
+        controller: Controller,
+        starts: np.ndarray,
+        disturbances: Disturbances | None,
+        per_individual: int,
+        to_beat: np.ndarray,
+        exploration: Exploration,
+    ) -> Trials:
         n, time = len(starts), self._task.control_step
         noise, of = _noise(disturbances, n, time)
         reach = self._task.sensor_range
@@ -412,6 +494,7 @@ class FusedTrials:
                 plan,
                 task,
                 noise,
+                exploration,
                 of,
                 controller.hidden,
                 controller.output,
