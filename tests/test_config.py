@@ -141,6 +141,7 @@ COMMON = {
     "randomise": False,
     "calibration": None,
     "start_clearance": 0.01,
+    "body_margin": 0.0,
     "network": "feedforward",
     "hidden": 4,
     "biases": False,

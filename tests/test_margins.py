@@ -11,17 +11,18 @@ from epuck_mj.rungs.kinematic.fused import FITNESS
 from epuck_mj.rungs.kinematic.plan import plan_of
 from epuck_mj.rungs.late import with_late_commands
 from epuck_mj.rungs.table import robots_in
+from epuck_mj.scene.changed_robots import (
+    with_body_margin,
+    with_body_radius,
+    with_sensors_set_back,
+)
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.robot_parts import SHELL
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters, run_trials
 from evolution.judging.evaluation import BatchEngine, Work
 from evolution.margins.__main__ import measure_margins
-from evolution.margins.changed_robots import (
-    CHANGES,
-    with_body_radius,
-    with_sensors_set_back,
-)
+from evolution.margins.changes import CHANGES
 from evolution.margins.margins_table import (
     FILE,
     Margins,
@@ -31,6 +32,8 @@ from evolution.margins.margins_table import (
 )
 from evolution.margins.measuring import Margin, margins_of_genomes, margins_of_policy
 from evolution.report.figures.margins import margins_figure
+from evolution.run.generation_loop import Evolution
+from evolution.settings.config_files import find_config, load_config
 from evolution.settings.setting import Setting
 
 ROBOT = "epuck_kinematic"
@@ -55,6 +58,29 @@ def test_another_radius_changes_the_shell_and_nothing_else(square):
     np.testing.assert_array_equal(after.rays, before.rays)
     # the scene itself is as it was
     assert square.model.geom_size[square.model.geom(SHELL).id, 0] == BODY_RADIUS
+
+
+def test_a_margin_widens_the_body_on_every_robot(scene):
+    wider = with_body_margin(scene, 0.0005)
+    shell = wider.model.geom(SHELL)
+    np.testing.assert_allclose(shell.size[0], BODY_RADIUS + 0.0005)
+    assert with_body_margin(scene, 0.0) is scene
+    # as heavy as before
+    np.testing.assert_array_equal(wider.model.body_mass, scene.model.body_mass)
+
+
+def test_champions_keep_off_walls_by_the_margin_of_their_bodies():
+    config = load_config(find_config("de-best")).model_copy(
+        update={"body_margin": 0.002, "climb": 0.5, "evaluations": 900, "steps": 20}
+    )
+    evolution = Evolution(config, threads=1)
+    # what is chosen and tested is the robot itself
+    assert evolution.scene.model.geom(SHELL).size[0] == BODY_RADIUS
+    list(evolution.run())
+    assert evolution.climbed
+    again = Evolution(config.model_copy(update={"body_margin": 0.0}), threads=1)
+    list(again.run())
+    assert again.history() != evolution.history()
 
 
 def test_sensors_are_set_back_along_their_rays(square):

@@ -85,6 +85,7 @@ LIMITS: Mapping[str, Limit] = MappingProxyType(
         "w_max": _above_0(5, "rad/s"),
         "sensor_range": _above_0(1, "m", LENGTHS),
         "start_clearance": _above_0(1, "m", LENGTHS),
+        "body_margin": Limit(0, 0.01, "m", LENGTHS, whole=False),
         "hidden": Limit(1, 1000),
         "weight_bound": _above_0(1_000_000),
         "weight_init": _above_0(1_000_000),

@@ -12,7 +12,7 @@ from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import Everybody, Policy
 from evolution.judging.evaluation import BatchEngine, Work, evaluate
 from evolution.judging.held_out_starts import starts_for_test
-from evolution.margins.changed_robots import CHANGES
+from evolution.margins.changes import CHANGES
 from evolution.settings.setting import Setting
 
 

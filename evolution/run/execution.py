@@ -47,7 +47,7 @@ class Loaded:
         """Start with nothing; `threads` step the judges' robots, 0 is one per core."""
         self._threads = threads
         self.judges = Judges(threads)
-        self._places: dict[tuple[str, bool, Setting], Place] = {}
+        self._places: dict[tuple[str, bool, float, Setting], Place] = {}
 
     def place(self, config: ExperimentConfig) -> Place:
         """Where the robots of a run drive.
@@ -56,7 +56,7 @@ class Loaded:
             UserError: if robot or arena cannot be used.
         """
         robot, setting = config.robot, config.setting
-        key = robot, config.climbs, setting
+        key = robot, config.climbs, config.body_margin, setting
         if key not in self._places:
             if len(self._places) == PLACES_KEPT:
                 self._places, self.judges = {}, Judges(self._threads)

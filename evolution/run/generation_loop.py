@@ -10,6 +10,7 @@ from dataclasses import astuple, dataclass, replace
 import numpy as np
 
 from epuck_mj.errors import UserError
+from epuck_mj.scene.changed_robots import with_body_margin
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
@@ -46,12 +47,13 @@ class Place:
     Attributes:
         scene: the robot that the run begins with, in its arena.
         space: where that robot may start.
-        wheels: the robot that the run climbs to there; `scene` if it does not climb.
+        evolved: the same with the margin of its body, and the robot that the run climbs
+            to there, if it climbs.
     """
 
     scene: Scene
     space: FreeSpace
-    wheels: Scene
+    evolved: tuple[Scene, ...]
 
     @classmethod
     def of(cls, config: ExperimentConfig) -> "Place":
@@ -61,10 +63,12 @@ class Place:
             UserError: if robot or arena cannot be used.
         """
         scene = load_scene(config.robot, config.arena, config.control_step)
-        space, wheels = FreeSpace(scene, config.start_clearance), scene
+        space, scenes = FreeSpace(scene, config.start_clearance), [scene]
         if config.climbs:
             wheels = load_scene(WHEELED_ROBOT, config.arena, config.control_step)
-        return cls(scene, space, wheels)
+            scenes.append(wheels)
+        evolved = [with_body_margin(each, config.body_margin) for each in scenes]
+        return cls(scene, space, tuple(evolved))
 
 
 class Evolution:
@@ -100,18 +104,18 @@ class Evolution:
         check_needs(config)
         self.config = config
         where = (place or Place.of)(config)
-        self.scene, self.space, self._wheels = where.scene, where.space, where.wheels
+        self.scene, self.space, self._evolved = where.scene, where.space, where.evolved
         self._maker: EngineMaker = (
             (lambda scene: make_engine(engine, scene, config, threads))
             if isinstance(engine, str)
             else engine
         )
-        self.engine = self._maker(self.scene)
+        self.engine = self._maker(self._evolved[0])
         # that an individual can only lose shows only if fitness has a maximum
         self.racing = racing and config.task.step_fitness.maximum is not None
         self.optimizer = _optimizer(config)
         self._threads = threads
-        self._lesson_scene, self._lesson_robots = self.scene, None
+        self._lesson_scene, self._lesson_robots = self._evolved[0], None
         if self.optimizer.needs_lessons:
             learnable(config.topology)
         self.records: list[Record] = []
@@ -158,8 +162,9 @@ class Evolution:
 
     def climb(self) -> None:
         """Run all further trials on wheels."""
-        self.engine = self._maker(self._wheels)
-        self._lesson_scene, self._lesson_robots = self._wheels, None
+        wheels = self._evolved[-1]
+        self.engine = self._maker(wheels)
+        self._lesson_scene, self._lesson_robots = wheels, None
 
     def release(self) -> None:
         """Free the simulated robots, hundreds of megabytes, once all is evolved."""

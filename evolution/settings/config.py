@@ -117,6 +117,11 @@ class ExperimentConfig(BaseModel):
     start_clearance: Annotated[float, within("start_clearance")] = Field(
         START_CLEARANCE, description="least distance to a wall at a start [m]"
     )
+    body_margin: Annotated[float, within("body_margin")] = Field(
+        0.0,
+        description="evolve robots whose body is so much wider on every side, so that "
+        "champions keep off walls [m]; they are chosen and tested without it",
+    )
     network: NetworkName = Field(
         FEEDFORWARD,
         description="feedforward (the paper's, with the hidden neurons and biases "

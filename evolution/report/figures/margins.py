@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from epuck_mj.policies.wall_follower import YARDSTICK
-from evolution.margins.changed_robots import CHANGES
+from evolution.margins.changes import CHANGES
 from evolution.margins.margins_table import FILE, Margins, read_margins
 from evolution.pages.style import (
     FEW,

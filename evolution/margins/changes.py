@@ -1,40 +1,11 @@
-"""Changed robots: the kinematic robot with one number that differs."""
+"""Changes of the kinematic robot: one number that differs."""
 
-import copy
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-
-import mujoco
-import numpy as np
+from dataclasses import dataclass
 
 from epuck_mj.constants import BODY_RADIUS
+from epuck_mj.scene.changed_robots import with_body_radius, with_sensors_set_back
 from epuck_mj.scene.model import Scene
-from epuck_mj.scene.robot_parts import SHELL
-
-
-def with_body_radius(scene: Scene, radius: float) -> Scene:
-    """The scene with another radius of the robot's shell [m].
-
-    Sensors stay where they are. The maker's page says 35 mm; other sources differ by 1
-    to 4 mm.
-    """
-    model = copy.copy(scene.model)
-    shell = model.geom(SHELL).id
-    model.geom_rbound[shell] *= radius / model.geom_size[shell, 0]
-    model.geom_size[shell, 0] = radius
-    return replace(scene, model=model)
-
-
-def with_sensors_set_back(scene: Scene, back: float) -> Scene:
-    """The scene with all proximity sensors so far behind the robot's edge [m]."""
-    model = copy.copy(scene.model)
-    rays = model.sensor_type == mujoco.mjtSensor.mjSENS_RANGEFINDER
-    for site in np.unique(model.sensor_objid[rays]).tolist():
-        axes = np.empty(9)
-        mujoco.mju_quat2Mat(axes, model.site_quat[site])
-        # a ray leaves along its site's z axis
-        model.site_pos[site] -= back * axes.reshape(3, 3)[:, 2]
-    return replace(scene, model=model)
 
 
 @dataclass(frozen=True)
