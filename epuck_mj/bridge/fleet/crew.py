@@ -99,10 +99,11 @@ class Crew:
     def _hear(self, name: str, process: "subprocess.Popen[bytes]") -> None:
         """Pass on what a driver reports, and that it has ended."""
         over = False
-        for line in process.stdout or ():
-            report = _report(name, line)
-            over |= report.kind == OVER
-            self._reports.put(report)
+        with _pipe(process.stdout) as stdout:
+            for line in stdout:
+                report = _report(name, line)
+                over |= report.kind == OVER
+                self._reports.put(report)
         status = process.wait()
         word = ""
         if not over:
@@ -132,7 +133,7 @@ class Crew:
         for process in self._processes.values():
             # one that has ended reports that
             with contextlib.suppress(OSError):
-                stdin = _pipe(process)
+                stdin = _pipe(process.stdin)
                 stdin.write(GO)
                 stdin.flush()
 
@@ -140,7 +141,7 @@ class Crew:
         """Stop all robots, at once."""
         for process in self._processes.values():
             with contextlib.suppress(OSError):
-                _pipe(process).close()
+                _pipe(process.stdin).close()
 
     def await_end(self, hear: Callable[[Report], None]) -> None:
         """Wait until all drivers, which were told to stop, have ended.
@@ -173,6 +174,6 @@ def _report(name: str, line: bytes) -> Report:
         return Report(name, SAID, text)
 
 
-def _pipe(process: "subprocess.Popen[bytes]") -> IO[bytes]:
-    assert process.stdin is not None
-    return process.stdin
+def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:
+    assert pipe is not None
+    return pipe
