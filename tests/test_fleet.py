@@ -23,6 +23,7 @@ from epuck_mj.bridge.__main__ import bridge
 from epuck_mj.bridge.drive.order import Order
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Pty, Tcp
+from epuck_mj.bridge.fleet import crew, fleet_drive
 from epuck_mj.bridge.fleet.driver import MODULE
 from epuck_mj.bridge.fleet.members import Member, members_at, read_fleet
 from epuck_mj.constants import WHEEL_RADIUS
@@ -340,6 +341,33 @@ def test_a_robot_that_goes_while_a_person_is_asked(kinematic, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("handlers")
+def test_a_robot_whose_process_does_not_get_on(
+    kinematic, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr(fleet_drive, "MEETING_TIME_MAX", 5.0)
+    monkeypatch.setattr(crew.Crew, "_hear", deaf_to("robot-2", crew.Crew._hear))
+    with robots(kinematic, tmp_path, "", "") as there:
+        log = ("--log", str(tmp_path / "log"))
+        asked = [part for port in there for part in ("--port", port)]
+        assert bridge(["wall-follower", *asked, *log]) == 2
+        assert not any(ever_drove(emulator) for emulator in there.values())
+    error = capsys.readouterr().err
+    assert error == "error: robot-2: not met in 5 s, and given up\n"
+
+
+def deaf_to(name, hear):
+    """What hears of a robot only when its driver has ended."""
+
+    def hear_late(self, whose, process):
+        if whose == name:
+            process.wait()
+        hear(self, whose, process)
+
+    return hear_late
+
+
+@pytest.mark.slow
 def test_nobody_wants_to_start(kinematic, tmp_path):
     with (
         robots(kinematic, tmp_path, "", "") as there,
@@ -366,11 +394,15 @@ def test_nobody_wants_to_start(kinematic, tmp_path):
 )
 def test_a_robot_that_fails_stops_alone(kinematic, tmp_path, fault, status, message):
     log = tmp_path / "log"
-    with robots(kinematic, tmp_path, "", fault, "") as there:
-        done = ended(command(there, log, "--seconds", "8"))
-        first, second, third = (each.body.standing for each in there.values())
-        assert first and third
-        assert second == (status != 4)
+    # a machine so busy that others stopped as well gets more chances
+    for chance in (3, 2, 1):
+        with robots(kinematic, tmp_path, "", fault, "") as there:
+            done = ended(command(there, log, "--seconds", "8"))
+            first, second, third = (each.body.standing for each in there.values())
+            assert first and third
+            assert second == (status != 4)
+        if chance == 1 or done.stderr.count("error: ") == 1:
+            break
     assert done.returncode == status
     assert re.fullmatch(f"error: robot-2: {message}.*\n", done.stderr)
     # it is said at once, and the others drive on

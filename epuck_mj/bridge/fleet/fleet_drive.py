@@ -5,6 +5,7 @@ The keyboard and the signals are this process's: one key stops all.
 
 import contextlib
 import sys
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,11 +22,20 @@ from epuck_mj.host.interruption import Interruption
 from epuck_mj.host.output import OUTPUT_LOST, Output, OutputLost, complain, say
 from epuck_mj.trials.trajectory import Trajectory
 
+MEETING_TIME_MAX = 60.0
+"""Time after which a robot whose process has not met it is given up [s]. Chosen.
+
+Opening a port and greeting take at most CONNECT_TIME_MAX each; a slow computer takes
+most of the time to start forty processes.
+"""
+
 POLL_TIME = 0.02
 """Time between two looks at keys and signals [s]."""
 
 START_KEYS = b"\r\n"
 """Enter, as terminals send it."""
+
+NOT_ALL = "not all robots answered"
 
 NOT_STARTED = 2
 """Exit status of a fleet that did not drive, since a robot did not answer."""
@@ -73,6 +83,7 @@ class FleetDrive:
         self._interruption = interruption
         self._met: dict[str, str] = {}
         self._over: dict[str, Report] = {}
+        self._late: set[str] = set()
         self._pressed = b""
         self.ends: dict[str, End] = {}
         self.begun = False
@@ -80,12 +91,19 @@ class FleetDrive:
 
     def run(self, orders: Mapping[str, Order]) -> None:
         """Meet the robots that have orders, start them, and let them drive."""
-        self._until(lambda: len(self._met.keys() | self.ends.keys()) >= len(orders))
+        deadline = time.monotonic() + MEETING_TIME_MAX
+
+        def missing() -> set[str]:
+            return set(orders) - self._met.keys() - self.ends.keys()
+
+        self._until(lambda: not missing() or time.monotonic() > deadline)
+        self._late = missing()
         for name in orders:
             if name in self._met:
                 port = orders[name].port
                 self._screen.say(f"{name} at {port}: {self._met[name]}")
-        if self._keys.there and not self.ends and not self.stopped:
+        ready = not (self.ends or self._late or self.stopped)
+        if self._keys.there and ready:
             self._screen.say(
                 f"All {len(orders)} robots answer. Put each where it shall start.\n"
                 "Enter starts all of them. q, space or Ctrl-C ends."
@@ -93,8 +111,8 @@ class FleetDrive:
             self._until(
                 lambda: bool(self.ends) or any(k in self._pressed for k in START_KEYS)
             )
-        if self.ends or self.stopped:
-            self.stopped = self.stopped or "not all robots answered"
+        if self.ends or self._late or self.stopped:
+            self.stopped = self.stopped or NOT_ALL
             return
         keys = "q, space or " if self._keys.there else ""
         self._screen.say(f"{keys}Ctrl-C stops all.")
@@ -120,8 +138,10 @@ class FleetDrive:
     def _end(self, report: Report) -> None:
         """Remember how a driver ended, and say so if others drive on."""
         name, said = report.name, self._over.get(report.name, report)
-        alone = not self.stopped
-        self.ends[name] = End(report.status, said.text, said.facts, alone)
+        alone, word = not self.stopped, said.text
+        if name in self._late and self.stopped == NOT_ALL:
+            alone, word = True, f"not met in {MEETING_TIME_MAX:.0f} s, and given up"
+        self.ends[name] = End(report.status, word, said.facts, alone)
         if alone and self.begun:
             self._screen.say(f"{name}: {said.text}")
             self._screen.line(name, f"over: {said.text}")
