@@ -472,6 +472,16 @@ def test_a_champion_of_another_network(tmp_path):
         bridge([str(path), "--port", "x"])
 
 
+def test_the_directory_of_a_run_is_its_champion(tmp_path):
+    (tmp_path / "champion.json").write_text(CHAMPION.read_text())
+    log = ["--log", str(tmp_path / "log")]
+    with pytest.raises(UserError, match="no port '/dev/nope'"):
+        bridge([str(tmp_path), "--port", "/dev/nope", *log])
+    (tmp_path / "champion.json").unlink()
+    with pytest.raises(UserError, match=r"no champion in .*: its run is not"):
+        bridge([str(tmp_path), "--port", "/dev/nope", *log])
+
+
 @pytest.mark.slow
 def test_a_device_that_is_no_robot(tmp_path):
     """It echoes whatever it hears: one line, status 2, and soon."""

@@ -15,6 +15,8 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -23,11 +25,12 @@ from epuck_mj.bridge.__main__ import bridge
 from epuck_mj.bridge.drive.order import Order
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Pty, Tcp
-from epuck_mj.bridge.fleet import crew, fleet_drive
+from epuck_mj.bridge.fleet import crew, fleet_drive, screen
 from epuck_mj.bridge.fleet.driver import MODULE
 from epuck_mj.bridge.fleet.members import Member, members_at, read_fleet
 from epuck_mj.constants import WHEEL_RADIUS
 from epuck_mj.errors import UserError
+from epuck_mj.host.output import Output
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.trials.trajectory import Trajectory
 from tests.processes import PATIENCE, python_process
@@ -214,6 +217,70 @@ def test_drivers_load_no_physics_and_no_pictures():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("set()\n", "")
+
+
+# the screen
+
+
+class Lines:
+    """What a terminal of 80 columns shows of a stream of text."""
+
+    def __init__(self):
+        self.lines = [""]
+        self.lost = False
+        self._row = 0
+
+    def say(self, text: str) -> None:
+        for part in re.split(r"(\x1b\[\d+A\r|\x1b\[J|\n)", f"{text}\n"):
+            if up := re.fullmatch(r"\x1b\[(\d+)A\r", part):
+                self._row -= int(up[1])
+                assert self._row >= 0
+            elif part == "\x1b[J":
+                self.lines[self._row :] = [""]
+            elif part == "\n":
+                self._row += 1
+                self.lines[self._row :] = [""]
+            else:
+                self.lines[self._row] = part
+                assert len(part) < 80
+
+    @property
+    def shown(self) -> list[str]:
+        return self.lines[:-1]
+
+
+def test_status_lines_are_rewritten_below_what_was_said(monkeypatch):
+    monkeypatch.setattr(screen.sys, "stdout", SimpleNamespace(isatty=lambda: True))
+    monkeypatch.setattr(screen, "PERIOD", 0.0)
+    seen = Lines()
+    shown = screen.Screen(cast(Output, seen), ["anna", "bert"])
+    shown.say("both answer")
+    shown.line("anna", "1")
+    shown.draw()
+    assert seen.shown == ["both answer", "anna  1", "bert  "]
+    shown.line("bert", "2")
+    shown.line("anna", "x" * 100)
+    shown.draw()
+    assert seen.shown == ["both answer", "anna  " + "x" * 73, "bert  2"]
+    shown.say("bert: ended")
+    assert seen.shown == ["both answer", "bert: ended"]
+    shown.draw()
+    shown.draw()
+    assert seen.shown == ["both answer", "bert: ended", "anna  " + "x" * 73, "bert  2"]
+
+
+def test_without_a_terminal_each_robot_has_a_line_now_and_then(monkeypatch):
+    monkeypatch.setattr(screen.sys, "stdout", SimpleNamespace(isatty=lambda: False))
+    seen = Lines()
+    shown = screen.Screen(cast(Output, seen), ["anna", "bert"])
+    for number in range(5):
+        shown.line("anna", str(number))
+        shown.line("bert", str(number))
+        shown.draw()
+    assert seen.shown == ["anna  0", "bert  0"]
+    monkeypatch.setattr(screen, "QUIET_PERIOD", 0.0)
+    shown.line("anna", "9")
+    assert seen.shown[2:] == ["anna  9"]
 
 
 # as planned
@@ -491,8 +558,11 @@ def test_a_terminal_that_vanishes(kinematic, tmp_path):
         wait_for(lambda: all_move(there), "all drove")
         terminal.close()
         assert slowest_stop(there) < STANDS
-        process.communicate(timeout=PATIENCE)
+        _, error = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
+    assert error == (
+        "error: stopped by the loss of the terminal; all robots stand still\n"
+    )
     assert driven(log, "robot-1").steps >= 0
 
 

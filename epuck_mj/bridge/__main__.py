@@ -51,7 +51,8 @@ class Options:
         seconds: duration of the drive [s].
         calibrate: first let the robot set its sensors' zero; nothing may be near it.
         calibration: file written by python -m epuck_mj.calibrate for this robot.
-        pose: start of the robot in the log: x and y [m] and heading [degrees].
+        pose: start of the robot in the arena of its log: x and y [m] and heading
+            [degrees]; if not given, the picture has no walls.
         max_speed: highest speed of a wheel [m/s]; the robot's own limit if not given.
         dry_run: read the sensors and compute commands, but do not move.
         arena: arena to show the log in; if not given, the one the champion evolved in.

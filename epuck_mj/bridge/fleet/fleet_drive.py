@@ -144,7 +144,7 @@ class FleetDrive:
         self.ends[name] = End(report.status, word, said.facts, alone)
         if alone and self.begun:
             self._screen.say(f"{name}: {said.text}")
-            self._screen.line(name, f"over: {said.text}")
+            self._screen.over(name, said.text)
 
     def _until(self, done: Callable[[], bool]) -> None:
         """Listen, and look at keys and signals, until done or all have to stop."""
@@ -206,6 +206,8 @@ def drive_fleet(orders: Mapping[str, Order], shows: Mapping[str, Show]) -> int:
     word = _word(fleet)
     if interruption.signum is not None:
         complain(f"{interruption.signum.name}: {word}")
+    elif status == OUTPUT_LOST:
+        complain(f"error: {word}")
     failure = None
     with contextlib.suppress(OutputLost):
         say(f"{word}\nwriting logs and pictures ..." if fleet.begun else word)

@@ -50,6 +50,10 @@ class Screen:
             self._said[name] = now
             self._write(self._named(name, text))
 
+    def over(self, name: str, text: str) -> None:
+        """Show why a robot has ended, where it had its status."""
+        self._lines[name] = text
+
     def draw(self) -> None:
         """Draw the status lines on a terminal, if it is time for that."""
         now = time.monotonic()
