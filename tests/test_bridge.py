@@ -183,6 +183,37 @@ def test_a_champion_drives_a_robot(kinematic, port, tmp_path):
     assert 0.05 < (pixels[..., :3].min(axis=-1) < 0.9).mean() < 0.5
 
 
+WITHOUT_PICTURES = """
+import sys
+from epuck_mj.bridge.__main__ import bridge
+from epuck_mj.bridge.drive import alone
+
+line = alone.live_line
+
+def watched(*arguments):
+    assert not {"matplotlib", "rerun"} & set(sys.modules)
+    return line(*arguments)
+
+alone.live_line = watched
+sys.exit(bridge(sys.argv[1:]))
+"""
+
+
+@pytest.mark.slow
+def test_pictures_are_for_robots_that_stand(kinematic, port, tmp_path):
+    """What draws them takes its time to load."""
+    with living(port, kinematic, AT_WALL):
+        done = run(
+            port.name,
+            tmp_path / "log",
+            *("--seconds", "1.5"),
+            how=lambda arguments: by_itself(["-c", WITHOUT_PICTURES, *arguments[4:]]),
+        )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert " over\n" in done.stdout
+    assert (tmp_path / "log.png").stat().st_size > 1000
+
+
 @pytest.mark.slow
 def test_over_tcp_with_everything_asked_for(kinematic, tmp_path):
     Calibration(track=0.055).save(tmp_path / "robot.yaml")

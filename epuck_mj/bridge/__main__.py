@@ -1,5 +1,6 @@
 """A policy drives real robots: `python -m epuck_mj.bridge CHAMPION --port PORT`."""
 
+import contextlib
 import gc
 import math
 import time
@@ -94,12 +95,7 @@ def bridge(argv: Sequence[str]) -> int:
         if options.fleet is None
         else read_fleet(options.fleet)
     )
-    folder = log.log_name(options.log, "fleet")
-    orders = {
-        member.name: _order(options, member, log.prepare(folder / member.name))
-        for member in members
-    }
-    return _drive_fleet(options, orders)
+    return _drive_fleet(options, members)
 
 
 def _drive_alone(options: Options, order: Order) -> int:
@@ -113,17 +109,27 @@ def _drive_alone(options: Options, order: Order) -> int:
     return status
 
 
-def _drive_fleet(options: Options, orders: dict[str, Order]) -> int:
+def _drive_fleet(options: Options, members: Sequence[Member]) -> int:
     """Drive several robots, each by a process of its own; the exit status."""
-    for name, order in orders.items():
+    folder = log.log_name(options.log, "fleet")
+    orders, shows = {}, {}
+    for member in members:
+        order = _order(options, member, folder / member.name)
         # what is wrong with a file is known before a process is started
         try:
             mission(order)
+            shows[member.name] = _show(options, order)
         except UserError as error:
-            raise UserError(f"robot {name}: {error}") from None
-    return drive_fleet(
-        orders, {name: _show(options, order) for name, order in orders.items()}
-    )
+            raise UserError(f"robot {member.name}: {error}") from None
+        orders[member.name] = order
+    for order in orders.values():
+        log.prepare(Path(order.log))
+    try:
+        return drive_fleet(orders, shows)
+    finally:
+        # empty, if nobody drove
+        with contextlib.suppress(OSError):
+            folder.rmdir()
 
 
 def _order(options: Options, member: Member, name: Path) -> Order:

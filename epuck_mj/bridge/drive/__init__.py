@@ -3,6 +3,5 @@
 `robot` is `control.Robot` on a connection, with `schedule` and `odometry`. `session` is
 the control loop. `mission` is a whole drive, from the greeting to the arrays of its
 `log`, and an `order` is a mission in plain values. `alone` is a drive of one robot on a
-terminal, with output as the `console` has it, stop keys of the `keyboard`, and `pictures`
-in the end.
+terminal, with output on the `console`, stop keys of the `keyboard`, and `pictures`.
 """

@@ -7,7 +7,7 @@ import os
 import select
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 try:
     import termios
@@ -63,7 +63,9 @@ def keyboard() -> Iterator[Keyboard]:
         tty.setcbreak(handle, termios.TCSANOW)
         yield Keyboard(handle)
     finally:
-        termios.tcsetattr(handle, termios.TCSANOW, before)
+        # a terminal that has gone keeps no mode
+        with suppress(termios.error):
+            termios.tcsetattr(handle, termios.TCSANOW, before)
 
 
 def _read(handle: int) -> bytes:

@@ -50,10 +50,12 @@ class Reporter:
 
     def listen(self) -> None:
         """Wait for GO and for the end of standard input, which ends the drive."""
-        while heard := os.read(0, len(GO)):
-            if GO.startswith(heard):
-                self._go.set()
-        send(signal.SIGTERM)
+        try:
+            while heard := os.read(0, len(GO)):
+                if GO.startswith(heard):
+                    self._go.set()
+        finally:
+            send(signal.SIGTERM)
 
     def report(self, kind: str, text: str, **more: object) -> None:
         """Tell the fleet something, if it still is there."""
