@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 
 from epuck_mj.bridge.__main__ import bridge
+from epuck_mj.bridge.drive import pictures
 from epuck_mj.bridge.drive.order import Order
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Pty, Tcp
@@ -460,6 +461,47 @@ def test_nobody_wants_to_start(kinematic, tmp_path):
 
 
 # one ends alone
+
+
+@pytest.mark.parametrize(
+    ("status", "alone", "failed"),
+    [
+        (0, True, False),
+        (3, True, True),
+        # somebody else stopped it
+        (143, True, True),
+        (143, False, False),
+        (0, False, False),
+        # as all were stopped
+        (3, False, True),
+        (4, False, True),
+    ],
+)
+def test_ends_that_are_failures(status, alone, failed):
+    assert fleet_drive.End(status, "", "", alone).failed == failed
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("handlers")
+def test_a_picture_that_cannot_be_written(kinematic, tmp_path, monkeypatch, capsys):
+    """The logs are written, all other pictures, too, and it is said."""
+    drawn = []
+
+    def save_pictures(name, *_):
+        if name.name == "robot-1":
+            raise UserError("the disk is full")
+        drawn.append(name.name)
+        return []
+
+    monkeypatch.setattr(pictures, "save_pictures", save_pictures)
+    log = tmp_path / "log"
+    with robots(kinematic, tmp_path, "", "") as there:
+        asked = [part for port in there for part in ("--port", port)]
+        arguments = ["wall-follower", *asked, "--log", str(log), "--seconds", "1"]
+        with pytest.raises(UserError, match=r"the disk is full; '.*robot-1\.npz' was"):
+            bridge(arguments)
+    assert drawn == ["robot-2"]
+    assert driven(log, "robot-1").steps == driven(log, "robot-2").steps == 10
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ The keyboard and the signals are this process's: one key stops all.
 """
 
 import contextlib
+import signal
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -37,6 +38,9 @@ START_KEYS = b"\r\n"
 
 NOT_ALL = "not all robots answered"
 
+ASKED = 128 + signal.SIGTERM
+"""Exit status of a driver that was told to stop, and did."""
+
 NOT_STARTED = 2
 """Exit status of a fleet that did not drive, since a robot did not answer."""
 
@@ -60,7 +64,8 @@ class End:
     @property
     def failed(self) -> bool:
         """Whether it ended in another way than was planned or asked for."""
-        return self.status != DONE if self.alone else self.status == RUNAWAY
+        asked = () if self.alone else (ASKED,)
+        return self.status not in (DONE, *asked)
 
 
 class FleetDrive:
@@ -182,6 +187,9 @@ def drive_fleet(orders: Mapping[str, Order], shows: Mapping[str, Show]) -> int:
     Args:
         orders: by the robots' names.
         shows: what writes the pictures of each log, when all robots stand.
+
+    Raises:
+        UserError: if all went well, but a log or a picture could not be written.
     """
     with (
         Output(sys.stdout) as output,
@@ -210,13 +218,15 @@ def drive_fleet(orders: Mapping[str, Order], shows: Mapping[str, Show]) -> int:
         complain(f"error: {word}")
     failure = None
     with contextlib.suppress(OutputLost):
-        say(f"{word}\nwriting logs and pictures ..." if fleet.begun else word)
+        say(f"{word}\nwriting pictures ..." if fleet.begun else word)
     for name, show in shows.items():
         unshown = _show(name, fleet.ends[name], Path(orders[name].log), show)
         failure = failure or unshown
+    if failure is not None and not status:
+        raise failure
     if failure is not None:
         complain(f"error: {failure}")
-    return status if status or failure is None else NOT_STARTED
+    return status
 
 
 def _word(fleet: FleetDrive) -> str:
