@@ -34,7 +34,7 @@ def drive_alone(
         clock: what the connection tells times by.
 
     Raises:
-        UserError: if it never began.
+        UserError: if it never began, or its log could not be written.
     """
     with (
         Output(sys.stdout) as output,
@@ -46,18 +46,22 @@ def drive_alone(
             outcome = accomplish(mission, connect, terminal, interruption, clock)
         finally:
             terminal.end_line()
-        # stdout may be lost, so errors go to stderr first, before pictures take time
+        # a person has to know before pictures take time; stdout may be lost
         if outcome.status:
             complain(outcome.word)
+        else:
+            with contextlib.suppress(OutputLost):
+                output.say(outcome.word)
         facts, failure = "", outcome.failure
         if outcome.robot is not None and outcome.session.start is not None:
             facts = drive_summary(outcome.session, outcome.robot)
             files, unshown = show_log(mission.log, outcome.trajectory, show, facts)
             failure = failure or unshown
             named = f"\nlog            {', '.join(map(str, files))}" if files else ""
-            facts = f"\n{facts}{named}"
+            facts = f"{facts}{named}"
         try:
-            output.say(facts if outcome.status else f"{facts}\n{outcome.word}")
+            if facts:
+                output.say(facts)
             output.finish()
         except OutputLost:
             if not outcome.status:
