@@ -20,7 +20,13 @@ STANDS = 0.5
 """Longest time from a fault to wheels that are told to stand [s]."""
 
 ENDS = 2.0
-"""Longest time from a fault, or a signal, to the end [s]."""
+"""Longest time from a fault, or a signal, to the end of a drive [s]."""
+
+PICTURES = 5.0
+"""Longest time that a process then takes for the pictures of its log [s].
+
+It loads rerun and matplotlib; the robot stands, and its port is free.
+"""
 
 DRIVES = 0.5
 """How long a robot is in order and drives [s]."""
@@ -51,7 +57,7 @@ class Meeting:
     def sound(self) -> bool:
         """Whether it keeps the limits."""
         stands = self.gone if self.stood is None else self.stood <= STANDS
-        return stands and self.ended <= ENDS
+        return stands and self.ended <= ENDS + PICTURES
 
 
 class NeverDrove(Exception):

@@ -296,8 +296,8 @@ def test_a_port_is_closed_if_no_guardian_can_be_had(monkeypatch):
     ("name", "message"),
     [
         ("/dev/no-such-port", "^no port '/dev/no-such-port'; available: "),
-        ("/dev/null", "^'/dev/null' is not a serial port$"),
-        ("/", "^'/' is not a serial port$"),
+        ("/dev/null", "^'/dev/null' is not a serial port; --list-ports"),
+        ("/", "^'/' is not a serial port; --list-ports"),
         ("", "cannot open port|no port"),
         ("socket://", "^expected socket://host:port with a port from 1 to 65535"),
         ("socket://127.0.0.1:99999", "^expected socket://host:port with a port from 1"),

@@ -7,7 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from epuck_mj.bridge.failures import DONE, FAILED, RUNAWAY, BridgeError, StillMoving
+from epuck_mj.bridge.failures import (
+    DONE,
+    FAILED,
+    RUNAWAY,
+    STOPPED,
+    BridgeError,
+    StillMoving,
+    told,
+    told_of_runaway,
+)
 from epuck_mj.bridge.line.connect import connect
 from epuck_mj.bridge.line.interfaces import Connection
 from epuck_mj.bridge.line.last_resort import leave_to_last_resort
@@ -39,11 +48,13 @@ class Options:
         port: port of the robot, as for the bridge.
         output: file to write; values in it that are not measured now stay.
         only: do only this step, instead of straight, turn and sensors.
+        verbose: messages have technical details.
     """
 
     port: Annotated[str, word("PORT")] = ""
     output: Annotated[Path, word("FILE")] = Path("robot.yaml")
     only: Annotated[Literal["straight", "turn", "sensors"] | None, word("STEP")] = None
+    verbose: bool = False
 
 
 def answer(question: str) -> str:
@@ -76,7 +87,13 @@ def calibrate(argv: Sequence[str], ask: Callable[[str], str] = answer) -> int:
     if not options.port:
         raise UserError("expected --port, as for python -m epuck_mj.bridge")
     steps = tuple(STEPS) if options.only is None else (options.only,)
-    status = calibrate_robot(steps, options.output, lambda: connect(options.port), ask)
+    status = calibrate_robot(
+        steps,
+        options.output,
+        lambda: connect(options.port),
+        ask,
+        verbose=options.verbose,
+    )
     if status == RUNAWAY:
         leave_to_last_resort(options.port)
     return status
@@ -89,6 +106,7 @@ def calibrate_robot(
     ask: Callable[[str], str],
     clock: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
+    verbose: bool = False,
 ) -> int:
     """Calibrate and write the file after each step; the exit status, as the bridge's.
 
@@ -99,6 +117,7 @@ def calibrate_robot(
         ask: shows a question and gives the answer.
         clock: what the connection tells times by.
         sleep: lets so many seconds go by.
+        verbose: whether messages have details.
 
     Raises:
         UserError: if something cannot be; the robot stands.
@@ -108,7 +127,7 @@ def calibrate_robot(
     known = Calibration.load(output) if is_file(output) else Calibration()
     status, word = DONE, ""
     with Interruption() as interruption:
-        bench = Bench(connect, interruption, clock, sleep)
+        bench = Bench(connect, interruption, clock, sleep, verbose)
         person = Person(ask, interruption)
         try:
             person.hear("The robot drives. Ctrl-C stops it and ends.")
@@ -121,10 +140,9 @@ def calibrate_robot(
         except Interrupted:
             pass
         except StillMoving as error:
-            status = RUNAWAY
-            word = f"error: THE MOTORS MAY STILL TURN, switch the robot off: {error}"
+            status, word = RUNAWAY, f"error: {told_of_runaway(error, verbose)}"
         except BridgeError as error:
-            status, word = FAILED, f"error: {error}; the robot stands still"
+            status, word = FAILED, f"error: {told(error, verbose, STOPPED)}"
         if interruption.signum is not None and status != RUNAWAY:
             status = interruption.status
             word = f"{interruption.signum.name}: ended, the robot stands still"

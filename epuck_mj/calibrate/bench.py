@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from epuck_mj.bridge.drive.robot import RealRobot
-from epuck_mj.bridge.failures import BridgeError, StillMoving
+from epuck_mj.bridge.failures import BridgeError, StillMoving, told
 from epuck_mj.bridge.line.interfaces import Connection
 from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import Interruption
@@ -53,6 +53,13 @@ SPARE_TIME = 5.0
 """Time beyond twice its own after which a drive has failed [s]. Chosen."""
 
 
+class TooFewSteps(BridgeError):
+    """The motors made fewer steps than they were told to."""
+
+    happened = "the motors turned too slowly, or not at all"
+    advice = "Charge its battery, and see whether something holds its wheels."
+
+
 @dataclass(frozen=True)
 class Bench:
     """Connection settings of the robot to calibrate.
@@ -62,12 +69,14 @@ class Bench:
         interruption: what ends a drive before its time.
         clock: what the connection tells times by [s].
         sleep: lets so many seconds go by.
+        verbose: whether messages have details.
     """
 
     connect: Callable[[], Connection]
     interruption: Interruption
     clock: Callable[[], float]
     sleep: Callable[[float], None]
+    verbose: bool = False
 
     def with_robot(self, calibration: Calibration, job: Callable[[RealRobot], T]) -> T:
         """Connect, do a job, and stop the robot; the job's result.
@@ -93,7 +102,7 @@ class Bench:
             except StillMoving:
                 raise
             except BridgeError as error:
-                raise UserError(str(error)) from None
+                raise UserError(told(error, self.verbose)) from None
             return job(robot)
 
 
@@ -191,7 +200,7 @@ def _drive(
     deadline = robot.last.time + patience
     while (so_far := made()) < steps:
         if robot.last.time > deadline:
-            raise BridgeError(f"{steps:.0f} steps in {patience:.0f} s", f"{so_far:.0f}")
+            raise TooFewSteps(f"{steps:.0f} steps in {patience:.0f} s", f"{so_far:.0f}")
         robot.step(command)
     for _ in range(N_REST):
         robot.step(np.zeros(2))

@@ -126,10 +126,11 @@ SOON = 0.01
 
 def send_soon(signum: signal.Signals) -> None:
     """Send a signal to this process in a moment."""
-    threading.Timer(SOON, _send, [signum]).start()
+    threading.Timer(SOON, send, [signum]).start()
 
 
-def _send(signum: signal.Signals) -> None:
+def send(signum: signal.Signals) -> None:
+    """Send a signal to this process, from any thread."""
     # to the thread that handles it, which may be waiting
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, signum)

@@ -95,6 +95,7 @@ def trajectory_figure(
     task: TaskParameters,
     titles: Sequence[str],
     columns: int | None = None,
+    walls: bool = True,
 ) -> Figure:
     """The arena from above with the path of each trajectory, side by side.
 
@@ -104,6 +105,7 @@ def trajectory_figure(
         task: what the trials were.
         titles: one per trajectory.
         columns: panels side by side; as many as rows, or one more, if not given.
+        walls: whether they are drawn: not if nobody knows where the robot started.
 
     Raises:
         ValueError: if there is no trajectory, or another number of titles.
@@ -117,10 +119,12 @@ def trajectory_figure(
     rows = -(-len(trajectories) // columns)
     figure = Figure(figsize=(3.2 * columns + 1, 3.4 * rows), layout="constrained")
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    walls = wall_outlines(scene)
+    outlines = wall_outlines(scene) if walls else []
     path = LineCollection([])
     for axes, trajectory, title in zip(panels.flat, trajectories, titles, strict=False):
-        axes.add_collection(PolyCollection(walls, facecolor="0.45", edgecolor="none"))
+        axes.add_collection(
+            PolyCollection(outlines, facecolor="0.45", edgecolor="none")
+        )
         path = _draw_trajectory(axes, scene, trajectory)
         axes.set(title=title, aspect="equal", xlabel="x [m]", ylabel="y [m]")
         axes.autoscale_view()

@@ -44,7 +44,8 @@ class Options:
     arena: tyro.conf.Positional[Annotated[str, word("ARENA")]]
     """name of a shipped arena, or path of an MJCF file"""
     champion: tyro.conf.Positional[Annotated[Path | None, word("RUN")]] = None
-    """controller file (JSON); the hand-written wall follower by default"""
+    """directory of a finished run, or controller file; by default the hand-written wall
+    follower"""
     robot: Annotated[str, word("ROBOT")] = "epuck"
     """name of a shipped robot, or path of an MJCF file"""
     pose: Annotated[tuple[float, float, float] | None, word("X Y DEGREES")] = None

@@ -1,4 +1,4 @@
-"""What a bridge prints: a status line that is rewritten, and a summary."""
+"""What a bridge prints of a drive: a status line, and a summary."""
 
 import numpy as np
 
@@ -26,6 +26,19 @@ HEADING = (
 )
 
 
+def fleet_line(step: Step, robot: RealRobot) -> str:
+    """Status of a control step beside a robot's name, in less than 70 characters."""
+    counts = " ".join(f"{count:4.0f}" for count in step.moment.proximity)
+    left, right = robot.told(step.control.command)
+    return (
+        f"{step.moment.time:5.1f} s {counts} {left:5d} {right:5d} "
+        f"{robot.schedule.n_overruns:3d}"
+    )
+
+
+FLEET_HEADING = " time   proximity counts ps0 to ps7             wheels steps/s  late"
+
+
 def drive_summary(session: Session, robot: RealRobot) -> str:
     """Summary of a session, one fact per line."""
     steps = session.steps
@@ -46,3 +59,14 @@ def drive_summary(session: Session, robot: RealRobot) -> str:
             f"fitness        {of_most(fitness, most)}, estimated",
         ]
     return "\n".join(lines)
+
+
+def fleet_summary(session: Session, robot: RealRobot) -> str:
+    """Summary of a session on one line."""
+    steps = session.steps
+    fitness = sum(float(step.control.fitness) for step in steps)
+    worth = of_most(fitness, session.task.most_in(len(steps))) if steps else "0"
+    return (
+        f"{len(steps)} control steps, {robot.schedule.n_overruns} too long, "
+        f"{robot.odometry.length:.2f} m, fitness {worth}"
+    )

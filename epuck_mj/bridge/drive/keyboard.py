@@ -7,7 +7,7 @@ import os
 import select
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 try:
     import termios
@@ -34,14 +34,19 @@ class Keyboard:
         """Whether there is a terminal to read keys from."""
         return self._handle is not None
 
-    def stop_wanted(self) -> bool:
-        """Whether a stop key is among the latest keys; does not wait."""
+    def pressed(self) -> bytes:
+        """The latest keys; does not wait."""
         if self._handle is None or not select.select([self._handle], [], [], 0)[0]:
-            return False
+            return b""
         keys = _read(self._handle)
         if not keys:
             # the terminal has gone
             self._handle = None
+        return keys
+
+    def stop_wanted(self) -> bool:
+        """Whether a stop key is among the latest keys; does not wait."""
+        keys = self.pressed()
         return any(key in keys for key in STOP_KEYS)
 
 
@@ -58,7 +63,9 @@ def keyboard() -> Iterator[Keyboard]:
         tty.setcbreak(handle, termios.TCSANOW)
         yield Keyboard(handle)
     finally:
-        termios.tcsetattr(handle, termios.TCSANOW, before)
+        # a terminal that has gone keeps no mode
+        with suppress(termios.error):
+            termios.tcsetattr(handle, termios.TCSANOW, before)
 
 
 def _read(handle: int) -> bytes:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from epuck_mj.bridge.failures import BridgeError
+from epuck_mj.bridge.failures import RobotRestarted
 from epuck_mj.bridge.language.replies import Steps, wrapped
 from epuck_mj.constants import STEP_RATE_MAX_2
 from epuck_mj.step.calibration import Calibration
@@ -48,7 +48,7 @@ class Odometry:
             now: the time [s].
 
         Raises:
-            BridgeError: if no motor can have made so many steps.
+            RobotRestarted: if no motor can have made so many steps.
         """
         before, self._counters = self._counters or counters, counters
         # the longest time that can lie between the two looks
@@ -57,7 +57,7 @@ class Odometry:
         steps = np.array([wrapped(left), wrapped(right)])
         possible = STEP_RATE_MAX_2 * elapsed + SLACK
         if np.abs(steps).max() > possible:
-            raise BridgeError(
+            raise RobotRestarted(
                 f"at most {possible:.0f} steps in {elapsed:.3f} s",
                 f"{steps[0]} and {steps[1]}: the robot was reset",
             )

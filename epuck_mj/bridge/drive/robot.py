@@ -11,6 +11,7 @@ from epuck_mj.bridge.drive.odometry import Odometry
 from epuck_mj.bridge.drive.schedule import Schedule
 from epuck_mj.bridge.failures import (
     BridgeError,
+    ComputerBusy,
     LinkLost,
     RobotRestarted,
     StaleReading,
@@ -21,6 +22,8 @@ from epuck_mj.constants import READING_AGE_MAX
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.motors import STEP_ANGLE, step_rates
 from epuck_mj.step.sensors import Reading, sensed_distance
+
+READING = f"a reading every {READING_AGE_MAX * 1000:.0f} ms"
 
 
 @dataclass(frozen=True)
@@ -140,6 +143,15 @@ class RealRobot:
         """Let the resting robot set its sensors' zero; nothing may be near it."""
         self._connection.calibrate()
 
+    def rest(self) -> None:
+        """Ask the robot, which stands and waits, for a reading.
+
+        So its loss is noticed, and over WiFi no readings pile up.
+        """
+        self._cycle((0, 0), changed=False)
+        # however long it takes until the next one
+        self._fresh_until = float("inf")
+
     def begin(self) -> Reading:
         """Start the first control step; the first reading."""
         self._origin = self._clock()
@@ -195,7 +207,7 @@ class RealRobot:
         asked = self._clock()
         if asked > self._fresh_until:
             age = asked - self._fresh_until + READING_AGE_MAX
-            raise _stale(f"none for {age * 1000:.0f} ms: this computer was busy")
+            raise ComputerBusy(READING, f"none for {age * 1000:.0f} ms")
         until = min(self._fresh_until, asked + READING_AGE_MAX)
         self._driven |= any(rates)
         try:
@@ -203,14 +215,10 @@ class RealRobot:
         except (LinkLost, RobotRestarted):
             raise
         except BridgeError as error:
-            raise _stale(f"none: {error}") from None
+            raise StaleReading(READING, f"none: {error}") from None
         finally:
             self.waited += self._clock() - asked
         now = self._clock()
         self._fresh_until = now + READING_AGE_MAX
         self.odometry.update(cycle.steps, asked, now)
         return np.array(cycle.proximity.counts, float)
-
-
-def _stale(came: str) -> StaleReading:
-    return StaleReading(f"a reading every {READING_AGE_MAX * 1000:.0f} ms", came)

@@ -44,9 +44,19 @@ def hire(fileno: Callable[[], int], farewell: bytes) -> subprocess.Popen | None:
     return subprocess.Popen(
         [sys.executable, "-I", "-S", __file__, str(port), farewell.hex()],
         stdin=subprocess.PIPE,
+        # who reads the bridge's output is not kept waiting for the guardian's end
+        stdout=subprocess.DEVNULL,
         pass_fds=[port],
         # Ctrl-C on a terminal is for the bridge
         start_new_session=True,
+    )
+
+
+def missing(port: str, error: OSError) -> str:
+    """Message for a person: without a guardian, a port is not used."""
+    return (
+        f"no guardian for '{port}', which would stop the robot if this program were "
+        f"killed, so the port was not used: {error}. Close other programs and try again"
     )
 
 

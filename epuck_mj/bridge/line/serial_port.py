@@ -44,7 +44,7 @@ class SerialPort:
             self._guardian = guardian.hire(self._serial.fileno, farewell)
         except OSError as error:
             self.close()
-            raise UserError(f"no guardian for '{name}': {error}") from None
+            raise UserError(guardian.missing(name, error)) from None
 
     def send(self, data: bytes) -> None:
         """See Port."""
@@ -86,16 +86,21 @@ def _why(name: str, error: Exception) -> str:
     reason = _one_line(error)
     if number == errno.ENOENT or isinstance(error, FileNotFoundError):
         names = ", ".join(port for port, _ in ports()) or "none"
-        return f"no port '{name}'; available: {names}"
+        advice = "Is the robot switched on and paired?"
+        return f"no port '{name}'; available: {names}. {advice}"
     if number in (errno.EACCES, errno.EPERM):
         return (
-            f"permission denied for port '{name}': its group, often dialout, may use it"
+            f"permission denied for port '{name}': its group, often dialout, may use "
+            "it. Join that group (sudo usermod -aG dialout $USER), then log in again"
         )
     if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in reason:
-        return f"port '{name}' is busy: another program has it"
+        return (
+            f"port '{name}' is busy: another program has it. Close that program, or "
+            "wait a minute: some systems try a new port for themselves"
+        )
     if "Inappropriate ioctl" in reason or number in (errno.EISDIR, errno.ENOTTY):
-        return f"'{name}' is not a serial port"
-    return f"cannot open port '{name}': {reason}"
+        return f"'{name}' is not a serial port; --list-ports lists the ports there are"
+    return f"cannot open port '{name}': {reason}. Is the robot on and near enough?"
 
 
 def _one_line(error: Exception) -> str:

@@ -33,7 +33,10 @@ class SocketPort:
         except (OSError, ValueError) as error:
             # ValueError: no name that a host can have
             reason = getattr(error, "strerror", None) or error
-            raise UserError(f"cannot open port '{name}': {reason}") from None
+            raise UserError(
+                f"cannot open port '{name}': {reason}. Is the robot on, and in this "
+                "computer's network?"
+            ) from None
         self._guardian = None
         try:
             # else a stop waits until what was sent before it is confirmed
@@ -41,7 +44,7 @@ class SocketPort:
             self._guardian = guardian.hire(self._socket.fileno, farewell)
         except OSError as error:
             self.close()
-            raise UserError(f"no guardian for '{name}': {error}") from None
+            raise UserError(guardian.missing(name, error)) from None
 
     def send(self, data: bytes) -> None:
         """See Port."""
