@@ -1,0 +1,1 @@
+"""PPO of stable-baselines3 on the vector environment, beside evolution."""
