@@ -2,6 +2,8 @@
 
 import ctypes.util
 import importlib
+import re
+import subprocess
 import sys
 import warnings
 from typing import Any
@@ -16,6 +18,7 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from epuck_mj.environments.gymnasium import ID, FollowWallsEnv, FollowWallsVectorEnv
 from epuck_mj.errors import UserError
 from epuck_mj.rungs.table import RUNGS
+from epuck_mj.scene.model_files import MODELS
 from epuck_mj.show import render
 from epuck_mj.step.calibration import Calibration
 
@@ -396,8 +399,21 @@ def test_pictures(robot):
     env.close()
     np.testing.assert_array_equal(other.render(), elsewhere)
     other.close()
-    assert make().render is not None
     check_env(make(robot=robot).unwrapped)
+
+
+@needs_opengl
+def test_who_forgets_to_close_hears_nothing():
+    code = (
+        "import gymnasium, epuck_mj.environments.gymnasium as g\n"
+        "env = gymnasium.make(g.ID, render_mode='rgb_array')\n"
+        "env.reset()\n"
+        "assert env.render().std() > 0"
+    )
+    result = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True
+    )
+    assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
 
 
 def test_without_a_render_mode_nothing_is_drawn():
@@ -405,3 +421,14 @@ def test_without_a_render_mode_nothing_is_drawn():
     env.reset(seed=0)
     assert env.render() is None
     env.close()
+
+
+def test_the_page_says_what_works(tmp_path, monkeypatch):
+    """Every Python block of the page runs, but for that of another library."""
+    monkeypatch.chdir(tmp_path)
+    page = (MODELS.parent / "docs" / "agents.md").read_text()
+    blocks = re.findall(r"^```python\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    ours = [block for block in blocks if "stable_baselines3" not in block]
+    assert len(ours) >= 3
+    for block in ours:
+        exec(compile(block, "agents.md", "exec"), {})

@@ -21,6 +21,7 @@ import tyro
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
+from benchmarks.ppo import CURVE
 from benchmarks.ppo.network import HIDDEN, Tanh, genome_of
 from benchmarks.ppo.robots import Robots
 from epuck_mj.environments.gymnasium import ID
@@ -36,7 +37,6 @@ from evolution.judging.held_out_starts import starts_for_validation
 
 NETWORK = f"{Tanh.__module__}:{Tanh.__name__}"
 ARENA = "arena"
-CURVE = "curve.json"
 
 ROBOTS = 1024
 ROLLOUT, BATCH = 64, 8192

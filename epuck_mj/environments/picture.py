@@ -1,5 +1,6 @@
 """Pictures of a trial that is going on."""
 
+import atexit
 from contextlib import ExitStack
 
 import numpy as np
@@ -48,10 +49,13 @@ class TrialPicture:
         if self._painter is None:
             artist = painter(self._scene, [self._trajectory], *self._size, draft=True)
             self._painter = self._open.enter_context(artist)
+            # OpenGL must be free before its library ends, also if nobody closes
+            atexit.register(self.close)
         return self._painter.picture(self._k * self._step).copy()
 
     def close(self) -> None:
         """Free OpenGL."""
+        atexit.unregister(self.close)
         self._open.close()
         self._painter = None
 
