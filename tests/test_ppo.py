@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from benchmarks.ppo import CURVE
-from benchmarks.ppo.figure import EXPERIMENT, figure_of, growth
+from benchmarks.ppo.figure import EXPERIMENT, comparison, figure_of, growth
 from benchmarks.ppo.network import LAYERS, Tanh, genome_of
 from epuck_mj.policies.file import CHAMPION, ControllerFile, Origin
 from epuck_mj.policies.topology import OwnNetwork, check_network
@@ -22,7 +22,7 @@ ROOT = Path(__file__).parent.parent
 NETWORK = "benchmarks.ppo.network:Tanh"
 LOOKS = [
     {"steps": 0, "seconds": 0.0, "fitness": 0.0, "crash_rate": 1.0},
-    {"steps": 3_000_000, "seconds": 9.0, "fitness": 80.0, "crash_rate": 0.1},
+    {"steps": 3_000_000, "seconds": 6.0, "fitness": 80.0, "crash_rate": 0.1},
 ]
 
 
@@ -99,7 +99,8 @@ def test_growth_is_the_best_so_far_after_so_many_steps():
     np.testing.assert_array_equal(found, [[5, 5, 5, 5, 9, 9], [2, 2, 2, 2, 2, 2]])
 
 
-def test_the_figure_has_all_of_both():
+@pytest.fixture
+def study():
     frames = [history(seed, [5.0, 90.0 + seed], [10**6] * 2) for seed in (1, 2)]
     champions = pd.DataFrame(
         {
@@ -108,7 +109,21 @@ def test_the_figure_has_all_of_both():
             "epuck_kinematic_mean": [70.0, 75.0],
         }
     )
-    study = Study(champions, pd.concat(frames), {})
+    others = champions.assign(experiment="ga", epuck_kinematic_mean=1.0)
+    return Study(pd.concat([champions, others]), pd.concat(frames), {})
+
+
+def test_both_are_compared_on_the_same_starts(study):
+    tests = [{"robot": "epuck_kinematic", "mean": 77.0, "crash_rate": 0.02}]
+    assert comparison({"looks": LOOKS, "seed": 4}, tests, study).splitlines() == [
+        "PPO, seed 4: 3.0 million steps in 0.1 minutes, best at 3.0",
+        "DE/best, 2 runs: 2.0 million steps, 2.0 to 2.0",
+        "epuck_kinematic, test starts: PPO 77.0, crashes in 2.0%; DE/best 72.5 "
+        "(median), 70.0 to 75.0",
+    ]
+
+
+def test_the_figure_has_all_of_both(study):
     figure = figure_of({"looks": LOOKS}, 77.0, study)
     [axes], [legend] = figure.axes, figure.legends
     texts = [text.get_text() for text in legend.get_texts()]

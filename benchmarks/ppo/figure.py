@@ -1,4 +1,4 @@
-"""Draw PPO beside DE/best: `python -m benchmarks.ppo.figure`.
+"""Draw and compare PPO and DE/best: `python -m benchmarks.ppo.figure`.
 
 The line of PPO is fitness on validation starts, which training did not use. Of DE/best
 a study has stored fitness by generation, which includes luck; what its champions are
@@ -32,7 +32,7 @@ N_POINTS = 200
 
 @dataclass(frozen=True)
 class Options:
-    """Draw fitness against control steps.
+    """Draw fitness against control steps, and print what champions are worth.
 
     Attributes:
         ppo: folder that `python -m benchmarks.ppo` wrote.
@@ -110,14 +110,37 @@ def figure_of(curve: dict, fitness: float, study: evolution.Study) -> Figure:
     return figure
 
 
+def comparison(curve: dict, tests: list[dict], study: evolution.Study) -> str:
+    """Lines with the control steps of both and the fitness of champions by robot."""
+    looks = curve["looks"]
+    last, best = looks[-1], max(looks, key=lambda look: look["fitness"])
+    champions: Any = study.champions[study.champions.experiment == EXPERIMENT]
+    spent = champions.control_steps / MILLION
+    lines = [
+        f"PPO, seed {curve['seed']}: {last['steps'] / MILLION:.1f} million steps in "
+        f"{last['seconds'] / 60:.1f} minutes, best at {best['steps'] / MILLION:.1f}",
+        f"DE/best, {len(champions)} runs: {spent.median():.1f} million steps, "
+        f"{spent.min():.1f} to {spent.max():.1f}",
+    ]
+    for test in tests:
+        theirs = champions[f"{test['robot']}_mean"]
+        lines.append(
+            f"{test['robot']}, test starts: PPO {test['mean']:.1f}, crashes in "
+            f"{test['crash_rate']:.1%}; DE/best {theirs.median():.1f} (median), "
+            f"{theirs.min():.1f} to {theirs.max():.1f}"
+        )
+    return "\n".join(lines)
+
+
 def main(options: Options) -> None:
-    """Read, draw, write."""
+    """Read, draw, write, print."""
     curve, tests = (
         json.loads((options.ppo / name).read_text()) for name in (CURVE, TEST)
     )
     [fitness] = [test["mean"] for test in tests if test["robot"] == KINEMATIC_ROBOT]
-    figure = figure_of(curve, fitness, evolution.load(options.study))
-    save_figure(figure, options.output, dpi=200)
+    study = evolution.load(options.study)
+    save_figure(figure_of(curve, fitness, study), options.output, dpi=200)
+    print(comparison(curve, tests, study))
 
 
 if __name__ == "__main__":
