@@ -151,5 +151,8 @@ def test_a_short_training_leaves_a_curve_and_a_champion(tmp_path):
     # the same seed, the same champion
     assert found[0] == found[1]
     champion = json.loads(found[0])
+    made_by = json.loads((tmp_path / "a" / "provenance.json").read_text())
+    assert {"torch", "stable-baselines3", "numba"} <= set(made_by["versions"])
+    assert set(champion["scene"]["own_sha256"]) == {NETWORK}
     best = max(look["fitness"] for look in curve["looks"])
     assert champion["scores"] == {"validation": best}

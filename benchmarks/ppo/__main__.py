@@ -10,9 +10,12 @@ suit many robots, and the noise of the first actions.
 # pyright: reportMissingImports=false
 
 import json
+import sys
 import time
 from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -26,6 +29,7 @@ from benchmarks.ppo.network import HIDDEN, Tanh, genome_of
 from benchmarks.ppo.robots import Robots
 from epuck_mj.environments.gymnasium import ID
 from epuck_mj.host.files import write_text
+from epuck_mj.host.own_parts import own_part
 from epuck_mj.policies.file import CHAMPION, ControllerFile, Origin
 from epuck_mj.policies.topology import OwnNetwork
 from epuck_mj.scene.model import load_scene
@@ -34,9 +38,12 @@ from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import START_CLEARANCE, TaskParameters
 from evolution.judging.evaluation import BatchEngine, evaluate
 from evolution.judging.held_out_starts import starts_for_validation
+from evolution.run.provenance import now, provenance, to_json
 
 NETWORK = f"{Tanh.__module__}:{Tanh.__name__}"
 ARENA = "arena"
+
+LIBRARIES = ("gymnasium", "stable-baselines3", "torch")
 
 ROBOTS = 1024
 ROLLOUT, BATCH = 64, 8192
@@ -59,7 +66,7 @@ class Options:
         minutes: when to stop in any case, by the clock.
         seed: of all randomness.
         threads: threads of torch.
-        output: folder to write `curve.json` and `champion.json` into.
+        output: folder to write `curve.json`, `champion.json` and `provenance.json` into.
     """
 
     steps: int = 45_000_000
@@ -86,9 +93,9 @@ class Judge(BaseCallback):
         """Load the validation starts of the kinematic robot."""
         super().__init__()
         task = TaskParameters()
-        scene = load_scene(KINEMATIC_ROBOT, ARENA, task.control_step)
-        self._engine = BatchEngine(scene, task, 1)
-        self._starts = starts_for_validation(FreeSpace(scene, START_CLEARANCE))
+        self.scene = load_scene(KINEMATIC_ROBOT, ARENA, task.control_step)
+        self._engine = BatchEngine(self.scene, task, 1)
+        self._starts = starts_for_validation(FreeSpace(self.scene, START_CLEARANCE))
         self._network = OwnNetwork(NETWORK)
         self._begun, self._end = time.monotonic(), time.monotonic() + 60 * minutes
         self.looks: list[Look] = []
@@ -139,13 +146,16 @@ def main(options: Options) -> None:
         device="cpu",
     )
     judge = Judge(options.minutes)
+    of_parts = {NETWORK: own_part(NETWORK).sha256}
+    made_by = provenance(judge.scene, of_parts, sys.argv, "ppo", options.threads)
+    made_by["versions"] |= {name: version(name) for name in LIBRARIES}
     model.learn(options.steps, callback=judge)
     judge.look()
-    _write(options, judge)
+    _write(options, judge, made_by | {"finished": now()})
 
 
-def _write(options: Options, judge: Judge) -> None:
-    """Write the curve, and the best policy as a controller file."""
+def _write(options: Options, judge: Judge, made_by: dict[str, Any]) -> None:
+    """Write the curve, the best policy as a controller file, and what made them."""
     options.output.mkdir(parents=True, exist_ok=True)
     curve = {
         "seed": options.seed,
@@ -157,10 +167,17 @@ def _write(options: Options, judge: Judge) -> None:
         OwnNetwork(NETWORK),
         judge.genome,
         TaskParameters(),
-        Origin(KINEMATIC_ROBOT, ARENA, START_CLEARANCE),
+        Origin(
+            KINEMATIC_ROBOT,
+            ARENA,
+            START_CLEARANCE,
+            made_by["mjcf_sha256"],
+            made_by["own_sha256"],
+        ),
         {"validation": judge.champion},
     )
     write_text(options.output / CHAMPION, file.to_json())
+    write_text(options.output / "provenance.json", to_json(made_by))
 
 
 if __name__ == "__main__":
