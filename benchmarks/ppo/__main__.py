@@ -66,7 +66,7 @@ class Options:
         minutes: when to stop in any case, by the clock.
         seed: of all randomness.
         threads: threads of torch.
-        output: folder to write `curve.json`, `champion.json` and `provenance.json` into.
+        output: folder for the curve, the champion and what made them.
     """
 
     steps: int = 45_000_000
@@ -147,7 +147,7 @@ def main(options: Options) -> None:
     )
     judge = Judge(options.minutes)
     of_parts = {NETWORK: own_part(NETWORK).sha256}
-    made_by = provenance(judge.scene, of_parts, sys.argv, "ppo", options.threads)
+    made_by = provenance(judge.scene, of_parts, sys.argv[1:], "ppo", options.threads)
     made_by["versions"] |= {name: version(name) for name in LIBRARIES}
     model.learn(options.steps, callback=judge)
     judge.look()
