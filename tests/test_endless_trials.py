@@ -15,6 +15,7 @@ from epuck_mj.policies.network import Network
 from epuck_mj.rungs.disturbed import DisturbedRobots, disturbed
 from epuck_mj.rungs.late import with_late_commands
 from epuck_mj.rungs.table import RUNGS, robots_in
+from epuck_mj.rungs.watched_robot import WatchedRobot
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.calibration import Calibration
@@ -241,6 +242,20 @@ def test_a_body_of_its_own_stays_with_the_robot_that_has_it():
         np.testing.assert_array_equal(a.distance[0], b.distance[0])
         np.testing.assert_array_equal(alone.poses()[0], among.poses()[0])
     assert (alone.poses()[1] != among.poses()[1]).all()
+
+
+def test_a_watched_robot_begins_anew_as_one_of_a_batch():
+    scene = load_scene("epuck", "arena", TASK.control_step)
+    robots = WatchedRobot(scene), robots_in(scene, 1, 1)
+    starts, command = np.array([[0.3, 0.1, 0.2]]), np.array([[5.0, 2.0]])
+    for each in robots:
+        each.reset(np.zeros((1, 3)))
+        each.step(command)
+    readings = [each.restart(np.array([0]), starts) for each in robots]
+    readings += [each.step(command) for each in robots]
+    for one, other in (readings[:2], readings[2:]):
+        np.testing.assert_array_equal(one.distance, other.distance)
+    np.testing.assert_array_equal(robots[0].poses(), robots[1].poses())
 
 
 def test_disturbances_that_are_shared_cannot_be_renewed():

@@ -22,7 +22,8 @@ from epuck_mj.scene.model_files import MODELS
 from epuck_mj.show import render
 from epuck_mj.step.calibration import Calibration
 
-ARENAS = ["arena", "round", "pillars"]
+ARENAS = sorted(path.stem for path in (MODELS / "arenas").glob("*.xml"))
+ON_WHEELS = ["arena", "round", "pillars"]
 AHEAD = np.array([1.0, 0.0])
 
 needs_opengl = pytest.mark.skipif(
@@ -47,8 +48,11 @@ def test_the_long_name_registers_by_itself():
     assert isinstance(make_vec(2, **mode), FollowWallsVectorEnv)
 
 
-@pytest.mark.parametrize("robot", RUNGS)
-@pytest.mark.parametrize("arena", ARENAS)
+@pytest.mark.parametrize(
+    ("robot", "arena"),
+    [("epuck_kinematic", arena) for arena in ("arena", *ARENAS)]
+    + [("epuck", arena) for arena in ON_WHEELS],
+)
 def test_the_library_finds_nothing_wrong(robot, arena):
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -17,9 +17,6 @@ from epuck_mj.step.control import ControlStep, control_step
 from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.step.sensors import Reading, observe
 
-LOWEST, HIGHEST = np.array([0.0, -1.0]), np.array([1.0, 1.0])
-"""Bounds of actions: v (forward) and w (turn, right positive)."""
-
 
 class EndlessTrials:
     """Trials of `n` robots; those whose trial is over are put on new starts."""
@@ -88,7 +85,7 @@ class EndlessTrials:
         step = control_step(
             self._robots, lambda _: action, self._observation, self.task, k
         )
-        self._observation = step.observation
+        self._observation = step.observation.copy()
         self._k += 1
         return step, self._k >= self.task.steps
 
@@ -104,7 +101,9 @@ class EndlessTrials:
             assert met is not None, "robots are disturbed in all trials or in none"
             self._robots.renew(which, met)
         self._k[which] = 0
-        return self._seen(self._robots.restart(which, starts))
+        seen = self._seen(self._robots.restart(which, starts))
+        self._observation[which] = seen
+        return seen
 
     def poses(self) -> np.ndarray:
         """Where the robots are, `(n, 3)`: x, y [m], yaw [rad]."""
@@ -115,46 +114,3 @@ class EndlessTrials:
 
     def _seen(self, reading: Reading) -> np.ndarray:
         return observe(reading.distance, self.task.sensor_range)
-
-
-def checked_action(given: object, shape: tuple[int, ...]) -> np.ndarray:
-    """Actions of a shape, `(..., 2)`, as floats in memory of their own.
-
-    Raises:
-        UserError: for anything else, or an action that is out of bounds.
-    """
-    try:
-        array = np.asarray(given)
-    except ValueError:
-        # of lists of unlike lengths
-        array = np.array(None)
-    got = f"{array.dtype} of shape {array.shape}"
-    if array.shape == shape and array.dtype.kind in "fiu":
-        action = array.astype(float)
-        # NaN is within no bounds
-        within = ((action >= LOWEST) & (action <= HIGHEST)).all(axis=-1)
-        if within.all():
-            return action
-        v, w = action[~within][0]
-        got = f"v = {v:g}, w = {w:g}"
-    raise UserError(
-        f"expected actions of shape {shape}, v from 0 to 1 and w from -1 to 1, got "
-        f"{got}"
-    )
-
-
-def checked_starts(given: object, shape: tuple[int, ...]) -> np.ndarray:
-    """Starts of a shape, `(..., 3)`: x, y [m], yaw [rad].
-
-    Raises:
-        UserError: for anything else.
-    """
-    try:
-        starts = np.asarray(given, float)
-    except (TypeError, ValueError):
-        starts = np.full(1, np.nan)
-    if starts.shape != shape or not np.isfinite(starts).all():
-        raise UserError(
-            f"starts: expected finite numbers of shape {shape}: x, y [m], yaw [rad]"
-        )
-    return starts
