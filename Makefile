@@ -6,7 +6,7 @@ RUN := runs/de-best-seed-1
 CHAMPION := results/paper/de-best/seed-1
 PAPERS := de-best de-rand ga
 
-.PHONY: run test bench ladder convergence racing overhead recording bridge gap results figures clean
+.PHONY: run test bench ladder convergence racing overhead recording bridge ppo gap results figures clean
 
 run: $(INSTALLED)
 	@if [ -f $(RUN)/config.yaml ]; then \
@@ -24,6 +24,7 @@ test: $(INSTALLED)
 
 bench: $(INSTALLED)
 	$(BIN)/python -m benchmarks.throughput --json results/throughput.json
+	$(BIN)/python -m benchmarks.gymnasium --json results/gymnasium.json
 	$(BIN)/python -m benchmarks.whole_run --json results/whole_run.json
 
 # how far the robots agree: about an hour on two cores; it goes on where it was stopped
@@ -45,6 +46,14 @@ recording: $(INSTALLED)
 # the bridge against the emulated robot, two minutes in real time; wants an idle machine
 bridge: $(INSTALLED)
 	$(BIN)/python -m benchmarks.bridge --json results/bridge.json
+
+# PPO beside DE/best: 15 minutes; needs the extra ppo, which is not in dev
+ppo: $(INSTALLED)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[ppo]'
+	$(BIN)/python -m benchmarks.ppo
+	$(BIN)/python -m evolution.evaluate results/ppo/champion.json \
+	  --json results/ppo/test.json
+	$(BIN)/python -m benchmarks.ppo.figure
 
 # champions of three seeds of each experiment in other worlds, kinematic and on wheels
 gap: $(INSTALLED)

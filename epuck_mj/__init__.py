@@ -1,7 +1,6 @@
-"""A MuJoCo e-puck: model, sensors, motors, controllers and dm_control tasks."""
+"""A MuJoCo e-puck: model, sensors, motors, controllers, environments for agents."""
 
 import importlib
-import os
 from typing import TYPE_CHECKING, Any
 
 from epuck_mj.host.loading import prepare as _prepare
@@ -13,9 +12,6 @@ if TYPE_CHECKING:
 
 # the first of a command's modules: loading the others takes seconds
 _prepare()
-
-# Nothing here draws: without this, a machine without a display prints GLFW warnings.
-os.environ.setdefault("MUJOCO_GL", "disabled")
 
 __all__ = ["SUITE", "UserError", "load", "load_scene"]
 

@@ -8,6 +8,9 @@ from pathlib import Path
 os.environ["CI"] = "1"
 os.environ["RERUN_STRICT"] = "1"
 
+# as in the project's commands: MuJoCo and dm_control look for no display
+os.environ.setdefault("MUJOCO_GL", "disabled")
+
 import numpy as np
 import pytest
 

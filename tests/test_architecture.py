@@ -19,8 +19,9 @@ ROOMS = {
         {"step"},
         {"policies", "scene"},
         {"rungs"},
-        {"environments", "trials"},
+        {"trials"},
         {"show"},
+        {"environments"},
         {"check", "view"},
         {"bridge"},
         {"calibrate"},
@@ -68,6 +69,7 @@ ALLOWED_IN = {
     "distributed": ("evolution/study/cluster/",),
     "dm_control": ("epuck_mj/environments/",),
     "dm_env": ("epuck_mj/environments/",),
+    "gymnasium": ("epuck_mj/environments/",),
     "imageio_ffmpeg": ("epuck_mj/show/video.py",),
     "markdown_it": ("evolution/pages/blocks.py",),
     "matplotlib": (
@@ -202,17 +204,37 @@ def test_starting_loads_what_is_used(modules, absent):
     assert (done.stdout.strip(), done.stderr) == ("", "")
 
 
-def test_nothing_here_draws():
-    """The whole package imports without OpenGL, display or a word."""
-    environment = {k: v for k, v in os.environ.items() if k != "DISPLAY"}
-    environment.pop("MUJOCO_GL", None)
-    code = (
-        "import epuck_mj, evolution.run.__main__; epuck_mj.load('follow_walls').reset()"
-    )
+def without_display(*arguments: str) -> tuple[int, str, str]:
+    """What a Python process with these arguments ends with, and says."""
+    gone = ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL")
     result = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code],
-        env=environment,
+        [sys.executable, "-W", "error", *arguments],
+        env={k: v for k, v in os.environ.items() if k not in gone},
         capture_output=True,
         text=True,
     )
-    assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
+    return result.returncode, result.stdout, result.stderr
+
+
+def test_nothing_here_draws():
+    """The whole package imports without OpenGL, display or a word."""
+    code = (
+        "import epuck_mj, evolution.run.__main__, epuck_mj.environments.gymnasium as g;"
+        "epuck_mj.load('follow_walls').reset(); g.FollowWallsEnv().reset()"
+    )
+    assert without_display("-c", code) == (0, "", "")
+
+
+def test_only_commands_say_how_mujoco_draws():
+    """Who imports the package may draw by any means that MuJoCo has."""
+    code = "import epuck_mj, os; print(os.environ.get('MUJOCO_GL'))"
+    assert without_display("-c", code) == (0, "None\n", "")
+    # the module of a command, loaded as `python -m` does
+    command = (
+        "import sys, os, importlib\n"
+        "sys.argv, sys.orig_argv[1:] = ['-m'], ['-m', {0!r}]\n"
+        "importlib.import_module({0!r}); print(os.environ.get('MUJOCO_GL'))"
+    )
+    for name in ("epuck_mj.check", "evolution.run", "benchmarks.ppo.network"):
+        found = without_display("-c", command.format(name))
+        assert found == (0, "disabled\n", "")

@@ -1,1 +1,1 @@
-"""Environments for agents: the dm_control task."""
+"""Environments for agents: the dm_control task, Gymnasium environments."""

@@ -8,12 +8,18 @@ actions give the same bits.
 # dm_control's base class has no types: its abstract methods look as if they gave None
 # pyright: reportIncompatibleMethodOverride=false
 
+import warnings
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from dm_control import mujoco
+
+with warnings.catch_warnings():
+    # dm_control tries GLFW first, which complains where there is no display
+    warnings.filterwarnings("ignore", module="glfw")
+    from dm_control import mujoco
+
 from dm_control.mujoco.wrapper import MjModel
 from dm_control.rl import control
 from dm_control.suite import base

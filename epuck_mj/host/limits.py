@@ -131,6 +131,9 @@ LIMITS: Mapping[str, Limit] = MappingProxyType(
         "gain": _above_0(100),
         "length": _above_0(1, "m", LENGTHS),
         # agents
+        "num_envs": COUNT,
+        "latency": Limit(0, 1000, "control steps"),
+        "pixels": Limit(1, 4096),
         "action": Limit(-1_000_000, 1_000_000, whole=False),
         "random": Limit(0, 2**32 - 1, why="or a numpy.random.RandomState, or None"),
         # command lines

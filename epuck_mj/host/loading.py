@@ -36,6 +36,8 @@ def prepare() -> None:
     """If this is a command: let nothing that it meets while loading be a traceback."""
     if not is_command():
         return
+    # commands make OpenGL themselves, if they draw: see `show.render`
+    os.environ.setdefault("MUJOCO_GL", "disabled")
     # a file must not get the number of a closed standard stream
     for number in range(3):
         try:

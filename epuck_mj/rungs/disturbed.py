@@ -48,7 +48,7 @@ class DisturbedRobots:
         """
         self._robots = robots
         self._disturbances = disturbances
-        self._share = disturbances.age / control_step
+        self._control_step = control_step
 
     def reset(self, starts: np.ndarray) -> Reading:
         """See `Robots.reset`.
@@ -59,14 +59,37 @@ class DisturbedRobots:
         given = self._disturbances
         if len(starts) != len(given):
             raise ValueError(f"expected {len(given)} starts, got {len(starts)}")
-        self._of, self._k = given.of, 0
+        self._of, self._k = given.of, np.zeros(len(starts), int)
+        self._share = given.age / self._control_step
         # the robot stands: older commands were 0
         self._sent = np.zeros((len(starts), given.latency.max() + 1, 2))
         self._robots.embody(given.mass[given.of], given.friction[given.of])
         reading = self._robots.reset(starts)
-        self._before = reading.distance
-        self._before = np.where(self._before > PROXIMITY_REACH, -1.0, self._before)
-        return self._sensed(reading)
+        self._before = _within_reach(reading.distance)
+        return self._sensed(reading, slice(None))
+
+    def renew(self, which: np.ndarray, disturbances: Disturbances) -> None:
+        """Give robots `(k,)` other disturbances, from their restart on.
+
+        Raises:
+            ValueError: if robots share disturbances.
+        """
+        given = self._disturbances
+        given.renew(which, disturbances)
+        self._share[which] = given.age[which] / self._control_step
+        # the farthest that a command may be on its way
+        more = given.latency.max() + 1 - self._sent.shape[1]
+        if more > 0:
+            self._sent = np.pad(self._sent, ((0, 0), (0, more), (0, 0)))
+
+    def restart(self, which: np.ndarray, starts: np.ndarray) -> Reading:
+        """See `Robots.restart`; other disturbances come by `renew`."""
+        given, of = self._disturbances, self._of[which]
+        self._k[which], self._sent[which] = 0, 0.0
+        self._robots.embody(given.mass[of], given.friction[of], which)
+        reading = self._robots.restart(which, starts)
+        self._before[which] = _within_reach(reading.distance)
+        return self._sensed(reading, which)
 
     def step(self, command: np.ndarray) -> Reading:
         """See `Robot.step`."""
@@ -80,13 +103,13 @@ class DisturbedRobots:
         mean = wheels.mean(axis=-1, keepdims=True)
         wheels = mean + (wheels - mean) * given.turn_gain[of, None]
         self._k += 1
-        return self._sensed(self._robots.step(wheels))
+        return self._sensed(self._robots.step(wheels), slice(None))
 
     def keep(self, mask: np.ndarray) -> None:
         """See `Robots.keep`."""
         self._robots.keep(mask)
         self._of, self._sent = self._of[mask], self._sent[mask]
-        self._before = self._before[mask]
+        self._before, self._k = self._before[mask], self._k[mask]
 
     def poses(self) -> np.ndarray:
         """See `Robots.poses`."""
@@ -96,16 +119,19 @@ class DisturbedRobots:
         """See `Robot.clearances`."""
         return self._robots.clearances()
 
-    def _sensed(self, reading: Reading) -> Reading:
-        """The disturbed reading, with the true distances."""
-        given, of = self._disturbances, self._of
-        # beyond their reach, sensors see nothing
-        seen = np.where(reading.distance > PROXIMITY_REACH, -1.0, reading.distance)
-        truth, before = seen, self._before
-        self._before = truth
+    def _sensed(self, reading: Reading, which: np.ndarray | slice) -> Reading:
+        """The disturbed reading of some robots, with the true distances."""
+        given, of, k = self._disturbances, self._of[which], self._k[which]
+        truth, before = _within_reach(reading.distance), self._before[which].copy()
+        self._before[which] = truth
         # of what is seen twice, readings are between the two
         aged = truth + (before - truth) * self._share[of]
         aged = np.where((truth < 0) | (before < 0), truth, aged)
-        counts = counted(aged, given.gains[of], given.count_noise[of, self._k])
+        counts = counted(aged, given.gains[of], given.count_noise[of, k])
         distance = sensed_distance(counts, given.known_gains[of])
         return Reading(distance, reading.contact, counts, reading.distance)
+
+
+def _within_reach(distance: np.ndarray) -> np.ndarray:
+    """Distances `(..., 8)`, negative beyond the sensors' reach: they see nothing."""
+    return np.where(distance > PROXIMITY_REACH, -1.0, distance)

@@ -34,6 +34,14 @@ class LateRobots:
         self._robots.keep(mask)
         self._sent = [command[mask] for command in self._sent]
 
+    def restart(self, which: np.ndarray, starts: np.ndarray) -> Reading:
+        """See `Robots.restart`."""
+        # the arrays are those of whoever sent them
+        self._sent = [command.copy() for command in self._sent]
+        for command in self._sent:
+            command[which] = 0.0
+        return self._robots.restart(which, starts)
+
     def poses(self) -> np.ndarray:
         """See `Robots.poses`."""
         return self._robots.poses()

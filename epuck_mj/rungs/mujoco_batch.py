@@ -55,10 +55,11 @@ class MujocoRobots:
                 f"expected at most {self.capacity} starts, got {len(starts)}"
             )
         self._active = np.arange(len(starts), dtype=np.int32)
-        self._batch.reset(self._active, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        self._qpos[: len(starts)] = self.scene.qpos(starts)
-        self._batch.forward(self._active, stage=mujoco.mjtStage.mjSTAGE_VEL.value)
-        return self._reading()
+        return self._placed(self._active, starts)
+
+    def restart(self, which: np.ndarray, starts: np.ndarray) -> Reading:
+        """See `Robots.restart`."""
+        return self._placed(which.astype(np.int32), starts)
 
     def step(self, command: np.ndarray) -> Reading:
         """Drive the active robots for one control step.
@@ -76,20 +77,25 @@ class MujocoRobots:
                 nstep=self.scene.n_substeps,
                 stage=mujoco.mjtStage.mjSTAGE_VEL.value,
             )
-        return self._reading()
+        return self._reading(self._active)
 
-    def embody(self, mass: np.ndarray, friction: np.ndarray) -> None:
+    def embody(
+        self, mass: np.ndarray, friction: np.ndarray, which: np.ndarray | None = None
+    ) -> None:
         """See `Simulator.embody`."""
-        n, changes = len(mass), wheel_limits(self.scene, len(mass))
+        changes = wheel_limits(self.scene, len(mass))
+        ids = np.arange(len(mass)) if which is None else which
+        ids = ids.astype(np.int32)
         others = self._embodied or (mass != 1).any() or (friction != 1).any()
         if others:
             changes |= body_fields(self.scene, mass, friction)
         for name, (where, values) in changes.items():
-            self._batch.expand(name)[:n, where] = values
+            places = np.flatnonzero(where) if where.dtype == bool else where
+            self._batch.expand(name)[ids[:, None], places] = values
         if others:
             self._embodied = True
             # what the contact solver has worked out from them
-            self._batch.set_const(np.arange(n, dtype=np.int32))
+            self._batch.set_const(ids)
 
     def disembody(self) -> None:
         """See `Simulator.disembody`."""
@@ -114,7 +120,14 @@ class MujocoRobots:
         """Clearance probe, made at its first use."""
         return ClearanceProbe(self.scene, self._threads)
 
-    def _reading(self) -> Reading:
+    def _placed(self, ids: np.ndarray, starts: np.ndarray) -> Reading:
+        """What robots `(k,)` sense that were put at rest on starts `(k, 3)`."""
+        self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        self._qpos[ids] = self.scene.qpos(starts)
+        self._batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_VEL.value)
+        return self._reading(ids)
+
+    def _reading(self, ids: np.ndarray) -> Reading:
         # of a single physics step, the sensor itself says all
-        history = self._history[self._active] if self.scene.n_substeps > 1 else None
-        return self.scene.reading(self._sensordata[self._active], history)
+        history = self._history[ids] if self.scene.n_substeps > 1 else None
+        return self.scene.reading(self._sensordata[ids], history)

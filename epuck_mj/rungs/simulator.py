@@ -14,14 +14,17 @@ class Simulator(Robots, Protocol):
 
     capacity: int
 
-    def embody(self, mass: np.ndarray, friction: np.ndarray) -> None:
-        """Give the robots bodies of their own, from the next reset on.
+    def embody(
+        self, mass: np.ndarray, friction: np.ndarray, which: np.ndarray | None = None
+    ) -> None:
+        """Give the robots bodies of their own, from their next reset or restart on.
 
         Their wheels may turn faster than a firmware would ask for: larger ones do.
 
         Args:
             mass: of each robot against the scene's, `(robots,)`.
             friction: of all but its shell, likewise.
+            which: numbers of the robots, `(robots,)`; None for the first of all.
         """
         ...
 

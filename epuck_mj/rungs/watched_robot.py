@@ -58,11 +58,17 @@ class WatchedRobot:
     def keep(self, mask: np.ndarray) -> None:
         """See `Robots.keep`: the robot stays, or none is left to step."""
 
+    def restart(self, which: np.ndarray, starts: np.ndarray) -> Reading:
+        """See `Robots.restart`: there is one robot."""
+        return self.reset(starts)
+
     def poses(self) -> np.ndarray:
         """Pose of the robot, `(1, 3)`: x, y [m], yaw [rad]."""
         return self.scene.poses(self.data.qpos[None])
 
-    def embody(self, mass: np.ndarray, friction: np.ndarray) -> None:
+    def embody(
+        self, mass: np.ndarray, friction: np.ndarray, which: np.ndarray | None = None
+    ) -> None:
         """See `Simulator.embody`."""
         fields = body_fields(self.scene, mass, friction) | wheel_limits(self.scene, 1)
         for name, (where, values) in fields.items():

@@ -1,7 +1,6 @@
 """Pictures in 3D, drawn by MuJoCo with EGL or OSMesa, without a window.
 
-The package switches MuJoCo's own choice between them off, so the context is made here
-and nowhere else.
+The context of OpenGL is made here, whatever MuJoCo itself would choose.
 """
 
 import copy
@@ -10,6 +9,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from ctypes.util import find_library
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -54,8 +54,10 @@ class Painter:
         width: int,
         height: int,
         draft: bool,
+        gl: Any,
     ):
-        """Set up the scene; OpenGL has to be current."""
+        """Set up the scene in a context `gl` of OpenGL, which has to be current."""
+        self._gl = gl
         # the copy is for looking at only
         model = copy.copy(scene.model)
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
@@ -86,6 +88,8 @@ class Painter:
         Returns:
             Picture `(height, width, 3)`, 0 to 255.
         """
+        # another painter may have drawn since
+        self._gl.make_current()
         for i, trajectory in enumerate(self._trajectories):
             pose = _pose_at(trajectory, time)
             self._data.qpos[:] = self._scene.qpos(pose)
@@ -132,6 +136,7 @@ class Painter:
 
     def free(self) -> None:
         """Free OpenGL's memory."""
+        self._gl.make_current()
         self._context.free()
 
 
@@ -155,8 +160,8 @@ def painter(
     Raises:
         UserError: if no OpenGL is there.
     """
-    with opengl(width, height):
-        artist = Painter(scene, trajectories, width, height, draft)
+    with opengl(width, height) as gl:
+        artist = Painter(scene, trajectories, width, height, draft, gl)
         try:
             yield artist
         finally:
@@ -164,8 +169,8 @@ def painter(
 
 
 @contextmanager
-def opengl(width: int, height: int) -> Iterator[None]:
-    """Make OpenGL without a window current for the block.
+def opengl(width: int, height: int) -> Iterator[Any]:
+    """Make a context of OpenGL without a window, current at the block's beginning.
 
     Raises:
         UserError: if there is none.
@@ -190,7 +195,7 @@ def opengl(width: int, height: int) -> Iterator[None]:
             f"{LIBRARIES[name]}, or MUJOCO_GL={other}"
         ) from None
     try:
-        yield
+        yield context
     finally:
         context.free()
 

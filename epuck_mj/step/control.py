@@ -49,6 +49,20 @@ class Robots(Robot, Protocol):
         """Keep only the active robots that `mask` selects."""
         ...
 
+    def restart(self, which: np.ndarray, starts: np.ndarray) -> Reading:
+        """Put some robots at rest on new starts, while the others go on.
+
+        Only as long as no robot was taken out.
+
+        Args:
+            which: numbers of these robots, `(k,)`.
+            starts: their poses `(k, 3)`: x, y [m], yaw [rad].
+
+        Returns:
+            What these robots sense there.
+        """
+        ...
+
 
 @dataclass(frozen=True)
 class TaskParameters:
@@ -132,9 +146,16 @@ class ControlStep:
 
 
 def control_step(
-    robot: Robot, policy: Policy, observation: np.ndarray, task: TaskParameters, k: int
+    robot: Robot,
+    policy: Policy,
+    observation: np.ndarray,
+    task: TaskParameters,
+    k: int | np.ndarray,
 ) -> ControlStep:
-    """Control step `k` of a trial, from 0 on, begun at `observation` `(..., 8)`."""
+    """Control step `k` of a trial, from 0 on, begun at `observation` `(..., 8)`.
+
+    Robots whose trials began at different times have each a `k` of its own, `(...)`.
+    """
     action = policy(observation)
     wheels = command(action, task.speeds)
     reading = robot.step(wheels)

@@ -144,6 +144,24 @@ class Disturbances:
         arrays = {field.name: getattr(self, field.name) for field in fields(self)}
         return type(self)(**{**arrays, "of": self.of[index]})
 
+    def renew(self, which: np.ndarray, others: Self) -> None:
+        """Put other disturbances in the place of those of some trials, in the arrays.
+
+        Args:
+            which: numbers of these trials, `(k,)`.
+            others: their new ones, `(k,)`.
+
+        Raises:
+            ValueError: if trials share disturbances.
+        """
+        if not np.array_equal(self.of, np.arange(len(self.gains))):
+            raise ValueError("expected a trial to share its disturbances with no other")
+        for field in fields(self):
+            if field.name != "of":
+                getattr(self, field.name)[which] = getattr(others, field.name)[
+                    others.of
+                ]
+
     def tiled(self, times: int) -> Self:
         """The disturbances repeated for each of `times` individuals."""
         return self[np.tile(np.arange(len(self)), times)]

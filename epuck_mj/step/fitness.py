@@ -33,7 +33,8 @@ class StepFacts:
             nothing was hit.
         contact: whether the robot touched a wall in the step, `(...)`: its trial ends
             here.
-        time: since the start, at the end of the step [s].
+        time: since the start, at the end of the step [s]; `(...)` where trials began
+            at different times.
         poses: gives `pose` when it is asked for.
         clearances: gives `clearance` when it is asked for.
     """
@@ -43,7 +44,7 @@ class StepFacts:
     observation: np.ndarray
     distance: np.ndarray
     contact: np.ndarray
-    time: float
+    time: float | np.ndarray
     poses: Callable[[], np.ndarray]
     clearances: Callable[[], np.ndarray]
 

@@ -61,7 +61,7 @@ class KinematicRobots:
             )
         self._states = at_rest(starts)
         self._lags = lags(self._plan, self._mass[: len(starts)], self._time)
-        distance, contact = self._empty()
+        distance, contact = _empty(len(starts))
         touch_all(self._plan, self._states, contact)
         sense_all(self._plan, self._states, ENDLESS, distance)
         return Reading(distance, contact)
@@ -75,7 +75,7 @@ class KinematicRobots:
             command: wheel speeds [rad/s], `(active, 2)`.
         """
         most = self._plan.body.speed_max * self._spare
-        distance, contact = self._empty()
+        distance, contact = _empty(len(self._states))
         step_all(
             self._plan,
             self._states,
@@ -86,6 +86,16 @@ class KinematicRobots:
             distance,
             contact,
         )
+        return Reading(distance, contact)
+
+    def restart(self, which: np.ndarray, starts: np.ndarray) -> Reading:
+        """See `Robots.restart`."""
+        states = at_rest(starts)
+        self._states[which] = states
+        self._lags[which] = lags(self._plan, self._mass[which], self._time)
+        distance, contact = _empty(len(states))
+        touch_all(self._plan, states, contact)
+        sense_all(self._plan, states, ENDLESS, distance)
         return Reading(distance, contact)
 
     def keep(self, mask: np.ndarray) -> None:
@@ -102,9 +112,12 @@ class KinematicRobots:
         """Distances from the active robots to the nearest wall [m], `(active,)`."""
         return self._probe.measure(self.poses()).distance
 
-    def embody(self, mass: np.ndarray, friction: np.ndarray) -> None:
+    def embody(
+        self, mass: np.ndarray, friction: np.ndarray, which: np.ndarray | None = None
+    ) -> None:
         """See `Simulator.embody`; wheels that roll have no friction to lose."""
-        self._mass, self._spare = np.asarray(mass, float), SPARE_SPEED
+        self._mass[slice(len(mass)) if which is None else which] = mass
+        self._spare = SPARE_SPEED
 
     def disembody(self) -> None:
         """See `Simulator.disembody`."""
@@ -115,9 +128,10 @@ class KinematicRobots:
         """Clearance probe, made at its first use."""
         return ClearanceProbe(self.scene, self._threads)
 
-    def _empty(self) -> tuple[np.ndarray, np.ndarray]:
-        n = len(self._states)
-        return np.empty((n, N_PROXIMITY)), np.empty(n, bool)
+
+def _empty(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Distances and contacts of a reading of `n` robots, to be filled."""
+    return np.empty((n, N_PROXIMITY)), np.empty(n, bool)
 
 
 def at_rest(starts: np.ndarray) -> np.ndarray:
