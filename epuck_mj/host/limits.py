@@ -122,6 +122,8 @@ LIMITS: Mapping[str, Limit] = MappingProxyType(
         # calibration files
         "gain": _above_0(100),
         "length": _above_0(1, "m", LENGTHS),
+        "latency": Limit(0, 100),
+        "lag": _above_0(100),
         # agents
         "action": Limit(-1_000_000, 1_000_000, whole=False),
         "random": Limit(0, 2**32 - 1, why="or a numpy.random.RandomState, or None"),

@@ -1,0 +1,276 @@
+"""Fit of a robot's parameters to a recorded drive, and how well they explain it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import LinAlgError
+
+from epuck_mj.calibrate.command_delay import CommandDelay, fit_delay, told_steps
+from epuck_mj.calibrate.drive_model import (
+    FAR,
+    GAINS,
+    LAG,
+    LEFT,
+    N_PARAMETERS,
+    OWN_TRACK,
+    RIGHT,
+    SIGHT,
+    DriveModel,
+    parameters_of,
+)
+from epuck_mj.calibrate.fitting import (
+    SATURATED,
+    TRACKS,
+    checked_wheel_radii,
+    refuse_outside,
+)
+from epuck_mj.calibrate.fitting import GAINS as GAIN_LIMITS
+from epuck_mj.calibrate.recorded_drive import RecordedDrive
+from epuck_mj.calibrate.smoothing import (
+    CAUCHY,
+    OUTLIER,
+    Smoothed,
+    followed,
+    smooth,
+)
+from epuck_mj.constants import N_PROXIMITY, TRACK, WHEEL_RADIUS
+from epuck_mj.errors import UserError
+from epuck_mj.rungs.kinematic.plan import plan_of
+from epuck_mj.scene.model import Scene
+from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.sensors import sensed_distance
+
+SLIPS = (0.08, 0.05, 0.03, 0.02, 0.01, 0.005)
+"""Relative slip of wheels in a control step: the likeliest is taken.
+
+Chosen around the 3 % of `NOISE`; the least is what counters do not tell about a motor's
+pace within a control step.
+"""
+
+FIRST_SLIP = 0.02
+"""Slip with which a drive is followed."""
+
+ERRORS_MAX = np.array([0.005, 0.005, 0.01, 0.15, *[0.05] * N_PROXIMITY])
+"""Standard errors up to which a drive shows a parameter, relative to it.
+
+Chosen: a quarter and less of the range in which robots differ (`RANGES`).
+"""
+
+LAG_MIN = 0.05
+"""Least lag that is written: none at all is no first-order lag."""
+
+STRANGE_MAX = 0.25
+"""Share of outliers among readings near walls up to which a fit is one. Chosen: robots
+that push a wall for a tenth of their drive stay below a tenth."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """How far what was recorded is from what is expected of a robot.
+
+    Attributes:
+        name: of it.
+        unit: of what is left.
+        n: how often it was recorded.
+        before: root mean square of what the known robot leaves.
+        after: of what the fitted one leaves.
+    """
+
+    name: str
+    unit: str
+    n: int
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, eq=False)
+class DriveFit:
+    """A robot as a drive shows it.
+
+    Attributes:
+        calibration: fitted; of what the drive does not show, the known values.
+        shown: whether the drive shows each parameter, `(12,)`, bool.
+        errors: standard error of each parameter, relative to it, `(12,)`.
+        delay: of commands.
+        slip: likeliest slip of the wheels in a control step, relative to their way.
+        start: most likely start: x, y [m], yaw [rad], `(3,)`.
+        turned: by all turns, back and forth alike [rad].
+        n_near: readings of each sensor near a wall, `(8,)`.
+        quantities: how well it explains the drive.
+    """
+
+    calibration: Calibration
+    shown: np.ndarray
+    errors: np.ndarray
+    delay: CommandDelay
+    slip: float
+    start: np.ndarray
+    turned: float
+    n_near: np.ndarray
+    quantities: tuple[Quantity, ...]
+
+
+def fit_drive(drive: RecordedDrive, scene: Scene, known: Calibration) -> DriveFit:
+    """Fit a robot to a drive in an arena.
+
+    Args:
+        drive: that was recorded.
+        scene: the kinematic robot in the arena.
+        known: what is known of the robot.
+
+    Raises:
+        UserError: if the drive does not fit the arena, shows nothing, or shows a robot
+            that no e-puck is.
+    """
+    delay = fit_delay(drive)
+    if not delay.known:
+        late = known.latency * drive.control_step
+        delay = replace(delay, delay=late, latency=known.latency)
+    plan = plan_of(scene, SIGHT, drive.control_step)
+    model = DriveModel(drive, plan, delay.delay, FIRST_SLIP)
+    before = parameters_of(known)
+    near = (drive.counts > FAR) & (drive.counts < SATURATED)
+    try:
+        model, joint = _likeliest(model, before)
+        _refuse_strange(model, joint, near)
+        shown = joint.errors <= ERRORS_MAX
+        # both or none: what is told apart is their sum and their difference
+        shown[[LEFT, RIGHT]] = shown[LEFT] and shown[RIGHT]
+        if not shown.any() and not delay.known:
+            raise UserError(
+                f"nothing of the robot can be told from this drive: its wheels rolled "
+                f"{drive.way * WHEEL_RADIUS:.2f} m, and {int(near.sum())} readings "
+                "were near a wall"
+            )
+        held = np.where(shown, joint.parameters, before)
+        after = smooth(
+            model, replace(joint, parameters=held), before, shown, loss=CAUCHY
+        )
+        nothing = np.zeros(N_PARAMETERS, bool)
+        unfitted = smooth(
+            model, replace(joint, parameters=before), before, nothing, loss=CAUCHY
+        )
+    except LinAlgError:
+        raise _strange(1.0, drive) from None
+    return DriveFit(
+        calibration=_checked(after.parameters, delay.latency),
+        shown=shown,
+        errors=joint.errors,
+        delay=delay,
+        slip=model.slip,
+        start=after.poses[0],
+        turned=float(np.abs(np.diff(after.poses[:, 2])).sum()),
+        n_near=near.sum(axis=0),
+        quantities=(
+            _motor_steps(drive, known.latency, delay.latency),
+            *_paths(model, unfitted, after),
+            *_readings(model, unfitted, after, near),
+        ),
+    )
+
+
+def _likeliest(model: DriveModel, known: np.ndarray) -> tuple[DriveModel, Smoothed]:
+    """The drive with all parameters fitted and the likeliest slip."""
+    free = np.ones(N_PARAMETERS, bool)
+    found = followed(model, known, free)
+    best = None
+    for slip in SLIPS:
+        model = replace(model, slip=slip)
+        found = smooth(model, found, known, free, loss=CAUCHY)
+        if best is None or found.evidence > best[1].evidence:
+            best = model, found
+    assert best is not None
+    return best
+
+
+def _refuse_strange(model: DriveModel, found: Smoothed, near: np.ndarray) -> None:
+    left = model.linearised(found.poses, found.parameters).seen
+    # expected and missed counts as well as seen and not expected
+    concerned = near | (np.abs(left) > OUTLIER)
+    if concerned.any():
+        share = float((np.abs(left[concerned]) > OUTLIER).mean())
+        if share > STRANGE_MAX:
+            raise _strange(share, model.drive)
+
+
+def _strange(share: float, drive: RecordedDrive) -> UserError:
+    x, y, yaw = drive.start
+    return UserError(
+        f"expected readings that fit the arena from a start at x {x:g} m, y {y:g} m, "
+        f"heading {np.degrees(yaw):.0f} degrees; {100 * share:.0f} % of those near a "
+        "wall do not: it was another --arena, another start (--pose), or no e-puck"
+    )
+
+
+def _checked(parameters: np.ndarray, latency: int) -> Calibration:
+    """The calibration of parameters that an e-puck can have.
+
+    Raises:
+        UserError: if none can.
+    """
+    radii = WHEEL_RADIUS * np.exp(parameters[[LEFT, RIGHT]])
+    track = float(TRACK * np.exp(parameters[OWN_TRACK]))
+    refuse_outside("a track", 1000 * track, (1000 * TRACKS[0], 1000 * TRACKS[1]), " mm")
+    gains = np.exp(parameters[GAINS]).tolist()
+    for number, gain in enumerate(gains):
+        refuse_outside(f"the gain of ps{number}", gain, GAIN_LIMITS, "")
+    return Calibration(
+        proximity_gains=tuple(gains),
+        wheel_radii=checked_wheel_radii(radii.tolist()),
+        track=track,
+        latency=latency,
+        lag=max(float(parameters[LAG]), LAG_MIN),
+    )
+
+
+def _motor_steps(drive: RecordedDrive, before: int, after: int) -> Quantity:
+    made = np.diff(drive.steps, axis=0)
+    left = [
+        made - told_steps(drive, latency * drive.control_step)
+        for latency in (before, after)
+    ]
+    return Quantity(
+        "motor steps in a control step", "steps", made.size, *map(_rms, left)
+    )
+
+
+def _paths(
+    model: DriveModel, before: Smoothed, after: Smoothed
+) -> tuple[Quantity, Quantity]:
+    """Where the counters alone lead, against where the walls say that it was."""
+    ways, turns = [], []
+    for each in (before, after):
+        path = model.path(after.poses[0], each.parameters)
+        off = path - after.poses
+        ways.append(1000 * _rms(np.hypot(off[:, 0], off[:, 1])))
+        turns.append(float(np.degrees(_rms(off[:, 2]))))
+    n = len(after.poses)
+    return (
+        Quantity("path by the counters alone", "mm", n, *ways),
+        Quantity("heading by the counters alone", "degrees", n, *turns),
+    )
+
+
+def _readings(
+    model: DriveModel, before: Smoothed, after: Smoothed, near: np.ndarray
+) -> list[Quantity]:
+    """Distances that the sensors tell, against those to the arena's walls."""
+    left = [
+        sensed_distance(model.drive.counts, np.exp(each.parameters[GAINS]))
+        - model.distances(each.poses)
+        for each in (before, after)
+    ]
+    return [
+        Quantity(
+            f"distance by ps{i}",
+            "mm",
+            int(near[:, i].sum()),
+            *(1000 * _rms(each[near[:, i], i]) for each in left),
+        )
+        for i in range(N_PROXIMITY)
+    ]
+
+
+def _rms(values: np.ndarray) -> float:
+    """Root mean square; NaN of nothing."""
+    return float(np.sqrt((values**2).mean())) if values.size else float("nan")

@@ -1,0 +1,333 @@
+"""Sparse least squares of all poses of a drive and the parameters of its robot.
+
+A pose meets only its neighbours and the parameters: the normal equations are a band
+with a border. So a step costs as much as the drive is long, while the solvers of
+mujoco.minimize and scipy.optimize would take its cube.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import LinAlgError, cholesky_banded, cho_solve_banded
+
+from epuck_mj.calibrate.drive_model import (
+    GAINS,
+    LAG,
+    N_PARAMETERS,
+    DriveModel,
+    Linearised,
+)
+
+START_ERROR = np.array([0.01, 0.01, np.radians(5)])
+"""Standard deviations of where a person puts a robot: x, y [m], yaw [rad]. Chosen."""
+
+LIKELY = np.array([0.03, 0.03, 0.05, 1.0, *[0.4] * 8])
+"""Standard deviations of parameters from their known values. Chosen: wider than robots
+differ, so that it is the drive that says where they are."""
+
+OUTLIER = 3.0
+"""Residual [standard deviations] from which one counts less than its square."""
+
+PIECE = 5
+PIECE_MAX, PIECE_SHARE = 40, 0.05
+"""Readings by which a followed drive grows: its share, within these limits."""
+
+PRECISION = 1e-4
+"""Part of its standard error by which a parameter may still change at the end."""
+
+N_ITERATIONS = 40
+"""Most steps of a fit; most take 5 to 10."""
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What residuals cost, `(...)` in standard deviations, and how much they weigh."""
+
+    cost: Callable[[np.ndarray], np.ndarray]
+    weights: Callable[[np.ndarray], np.ndarray]
+
+
+def _huber(residuals: np.ndarray) -> np.ndarray:
+    size = np.abs(residuals)
+    inside = np.minimum(size, OUTLIER)
+    return inside * (size - inside / 2)
+
+
+HUBER = Loss(
+    _huber, lambda residuals: OUTLIER / np.maximum(np.abs(residuals), OUTLIER)
+)
+"""Outliers pull as hard as OUTLIER, wherever they are: for poses that are far off."""
+
+CAUCHY = Loss(
+    lambda residuals: OUTLIER**2 / 2 * np.log1p((residuals / OUTLIER) ** 2),
+    lambda residuals: 1 / (1 + (residuals / OUTLIER) ** 2),
+)
+"""Outliers pull less the farther they are: for poses that are nearly right."""
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothed:
+    """Poses and parameters that explain a drive best.
+
+    Attributes:
+        poses: at each reading, `(T + 1, 3)`.
+        parameters: of the robot, `(12,)`.
+        errors: their standard errors, 0 of those held, `(12,)`.
+        cost: half of the sum of squares, outliers less.
+        evidence: logarithm of the likelihood of the drive with all poses and
+            parameters integrated out (Laplace), up to a constant.
+    """
+
+    poses: np.ndarray
+    parameters: np.ndarray
+    errors: np.ndarray
+    cost: float
+    evidence: float
+
+
+def followed(model: DriveModel, known: np.ndarray, free: np.ndarray) -> Smoothed:
+    """Smooth a drive from its start on, a few readings more at a time.
+
+    The counters alone lead astray within a minute; from one piece to the next they do
+    not.
+
+    Args:
+        model: of the drive.
+        known: parameters that it begins with, `(12,)`.
+        free: which of them are to be fitted, `(12,)`, bool.
+    """
+    n = PIECE
+    part = model.until(n)
+    found = Smoothed(
+        part.path(model.drive.start, known), known, np.zeros(N_PARAMETERS), 0.0, 0.0
+    )
+    last = len(model.drive.time)
+    while True:
+        found = smooth(part, found, known, free, 3 if n < last else N_ITERATIONS)
+        if n == last:
+            return found
+        grown = min(last, n + max(PIECE, min(PIECE_MAX, int(n * PIECE_SHARE))))
+        part = model.until(grown)
+        ahead = part.path(model.drive.start, found.parameters)
+        found = replace(
+            found, poses=np.concatenate([found.poses, _onward(found.poses, ahead, n)])
+        )
+        n = grown
+
+
+def _onward(poses: np.ndarray, path: np.ndarray, n: int) -> np.ndarray:
+    """The path from its row `n` on, moved to where the poses end."""
+    turned = poses[-1, 2] - path[n - 1, 2]
+    x, y = (path[n:, :2] - path[n - 1, :2]).T
+    cos, sin = np.cos(turned), np.sin(turned)
+    return np.stack(
+        [
+            poses[-1, 0] + cos * x - sin * y,
+            poses[-1, 1] + sin * x + cos * y,
+            path[n:, 2] + turned,
+        ],
+        axis=-1,
+    )
+
+
+def smooth(
+    model: DriveModel,
+    begin: Smoothed,
+    known: np.ndarray,
+    free: np.ndarray,
+    n_iterations: int = N_ITERATIONS,
+    loss: Loss = HUBER,
+) -> Smoothed:
+    """Smooth a drive from a guess, by damped Gauss-Newton steps.
+
+    Args:
+        model: of the drive.
+        begin: where to begin.
+        known: parameters as they are likely, `(12,)`.
+        free: which of them are to be fitted, `(12,)`, bool.
+        n_iterations: most steps.
+        loss: of residuals.
+    """
+    poses, parameters = begin.poses, begin.parameters
+    prior = Prior(model.drive.start, known)
+    now = model.linearised(poses, parameters)
+    cost = _cost(now, prior, poses, parameters, loss)
+    damping = 1e-6
+    for _ in range(n_iterations):
+        normal = _normal(now, prior, poses, parameters, free, loss)
+        better = False
+        while not better and damping < 1e6:
+            try:
+                pose_step, step, errors, _ = normal.solved(damping)
+            except LinAlgError:
+                damping *= 10
+                continue
+            other = poses + pose_step, parameters + step
+            other[1][LAG] = max(other[1][LAG], 0.0)
+            there = model.linearised(*other)
+            cost_there = _cost(there, prior, *other, loss)
+            better = cost_there < cost + 1e-9 * abs(cost)
+            damping = max(damping / 10, 1e-9) if better else damping * 10
+        if not better:
+            break
+        gained = cost - cost_there
+        poses, parameters, now, cost = *other, there, cost_there
+        small = np.abs(step) <= PRECISION * np.maximum(errors, 1e-9)
+        if small.all() and gained < 1e-3:
+            break
+    normal = _normal(now, prior, poses, parameters, free, loss)
+    _, _, errors, log_determinant = normal.solved(0.0)
+    evidence = -cost - now.log_scales - log_determinant / 2
+    return Smoothed(poses, parameters, errors, cost, evidence)
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known before a drive.
+
+    Attributes:
+        start: pose `(3,)`.
+        parameters: `(12,)`.
+    """
+
+    start: np.ndarray
+    parameters: np.ndarray
+
+    def of_start(self, poses: np.ndarray) -> np.ndarray:
+        """Residuals of the start, `(3,)`."""
+        return (poses[0] - self.start) / START_ERROR
+
+    def of(self, parameters: np.ndarray) -> np.ndarray:
+        """Residuals of the parameters, `(12,)`."""
+        return (parameters - self.parameters) / LIKELY
+
+
+def _cost(
+    now: Linearised,
+    prior: Prior,
+    poses: np.ndarray,
+    parameters: np.ndarray,
+    loss: Loss,
+) -> float:
+    total = 0.5 * float(
+        (prior.of_start(poses) ** 2).sum() + (prior.of(parameters) ** 2).sum()
+    )
+    return total + sum(
+        float(loss.cost(residuals).sum()) for residuals in (now.motion, now.seen)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Normal:
+    """Normal equations: a band of poses with a border of parameters.
+
+    Attributes:
+        diagonal: `(T + 1, 3, 3)`.
+        beside: of a pose and the next one, `(T, 3, 3)`.
+        border: of poses and free parameters, `(3 (T + 1), f)`.
+        corner: of the parameters, `(f, f)`.
+        pose_slope: `(3 (T + 1),)`.
+        slope: of the free parameters, `(f,)`.
+        free: which parameters those are, `(12,)`.
+    """
+
+    diagonal: np.ndarray
+    beside: np.ndarray
+    border: np.ndarray
+    corner: np.ndarray
+    pose_slope: np.ndarray
+    slope: np.ndarray
+    free: np.ndarray
+
+    def solved(
+        self, damping: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """Steps of poses and parameters, standard errors, log determinant.
+
+        Args:
+            damping: of the diagonal, relative to it.
+
+        Raises:
+            LinAlgError: if the matrix is not positive.
+        """
+        band = _band(self.diagonal, self.beside)
+        band[0] *= 1 + damping
+        factor = cholesky_banded(band, lower=True)
+        right = np.column_stack([self.border, self.pose_slope])
+        inverse = cho_solve_banded((factor, True), right)
+        by_border, by_slope = inverse[:, :-1], inverse[:, -1]
+        corner = self.corner + damping * np.diag(np.diag(self.corner))
+        schur = corner - self.border.T @ by_border
+        sign, log_corner = np.linalg.slogdet(schur)
+        if sign <= 0:
+            raise LinAlgError("not positive")
+        covariance = np.linalg.inv(schur)
+        step = np.zeros(N_PARAMETERS)
+        step[self.free] = -covariance @ (self.slope - self.border.T @ by_slope)
+        poses = -(by_slope + by_border @ step[self.free])
+        errors = np.zeros(N_PARAMETERS)
+        errors[self.free] = np.sqrt(np.diag(covariance))
+        determinant = 2 * float(np.log(factor[0]).sum()) + float(log_corner)
+        return poses.reshape(-1, 3), step, errors, determinant
+
+
+def _normal(
+    now: Linearised,
+    prior: Prior,
+    poses: np.ndarray,
+    parameters: np.ndarray,
+    free: np.ndarray,
+    loss: Loss,
+) -> Normal:
+    n = len(poses)
+    moved, seen = loss.weights(now.motion), loss.weights(now.seen)
+    a, b, c = now.motion_from, now.motion_to, now.motion_parameters[..., free]
+    wa, wb = moved[..., None] * a, moved[..., None] * b
+    diagonal = np.einsum("kip,kiq->kpq", seen[..., None] * now.seen_pose, now.seen_pose)
+    diagonal[:-1] += np.einsum("kip,kiq->kpq", wa, a)
+    diagonal[1:] += np.einsum("kip,kiq->kpq", wb, b)
+    diagonal[0] += np.diag(START_ERROR**-2)
+    beside = np.einsum("kip,kiq->kpq", wa, b)
+    # each sensor meets its own gain only
+    border = np.zeros((n, 3, N_PARAMETERS))
+    border[:, :, GAINS] = np.einsum(
+        "kip,ki->kpi", now.seen_pose, seen * now.seen_gains
+    )
+    border = border[..., free]
+    border[:-1] += np.einsum("kip,kiq->kpq", wa, c)
+    border[1:] += np.einsum("kip,kiq->kpq", wb, c)
+    corner = np.diag(LIKELY**-2)
+    corner[GAINS, GAINS] += np.diag((seen * now.seen_gains**2).sum(axis=0))
+    corner = corner[np.ix_(free, free)] + np.einsum(
+        "kip,kiq->pq", moved[..., None] * c, c
+    )
+    pose_slope = np.einsum("kip,ki->kp", now.seen_pose, seen * now.seen)
+    pose_slope[:-1] += np.einsum("kip,ki->kp", wa, now.motion)
+    pose_slope[1:] += np.einsum("kip,ki->kp", wb, now.motion)
+    pose_slope[0] += prior.of_start(poses) / START_ERROR
+    slope = prior.of(parameters) / LIKELY
+    slope[GAINS] += (now.seen_gains * seen * now.seen).sum(axis=0)
+    slope = slope[free] + np.einsum("kip,ki->p", c, moved * now.motion)
+    return Normal(
+        diagonal,
+        beside,
+        border.reshape(3 * n, -1),
+        corner,
+        pose_slope.ravel(),
+        slope,
+        free,
+    )
+
+
+def _band(diagonal: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """Lower band `(6, 3 n)` of a block-tridiagonal matrix, as LAPACK wants it."""
+    n = len(diagonal)
+    band = np.zeros((6, n, 3))
+    for column in range(3):
+        for row in range(column, 3):
+            band[row - column, :, column] = diagonal[:, row, column]
+        for row in range(3):
+            # the block below the diagonal is the transpose of that beside it
+            band[3 + row - column, :-1, column] = beside[:, column, row]
+    return band.reshape(6, 3 * n)
