@@ -3,4 +3,13 @@
 - `fitting`: gains, wheel radii and track computed from measurements;
 - `bench`: drives and readings of the robot, as safe as the bridge's;
 - `guide`: instructions and questions to the person with the ruler.
+
+Or from the log of a drive: `python -m epuck_mj.calibrate fit LOG`.
+
+- `recorded_drive`: what a log holds for a fit, checked;
+- `command_delay`: how late the motors do what they are told;
+- `drive_model`: how poses, wheels and sensors explain what was recorded;
+- `smoothing`: sparse least squares of all poses and the parameters;
+- `drive_fit`: the fit, what the drive does not show, and what is left;
+- `fit_command`: the command line, and its report.
 """

@@ -18,17 +18,18 @@ from epuck_mj.calibrate.drive_model import (
     DriveModel,
     parameters_of,
 )
+from epuck_mj.calibrate.fitting import GAINS as GAIN_LIMITS
 from epuck_mj.calibrate.fitting import (
     SATURATED,
     TRACKS,
     checked_wheel_radii,
     refuse_outside,
 )
-from epuck_mj.calibrate.fitting import GAINS as GAIN_LIMITS
 from epuck_mj.calibrate.recorded_drive import RecordedDrive
 from epuck_mj.calibrate.smoothing import (
     CAUCHY,
     OUTLIER,
+    Prior,
     Smoothed,
     followed,
     smooth,
@@ -59,9 +60,15 @@ Chosen: a quarter and less of the range in which robots differ (`RANGES`).
 LAG_MIN = 0.05
 """Least lag that is written: none at all is no first-order lag."""
 
-STRANGE_MAX = 0.25
-"""Share of outliers among readings near walls up to which a fit is one. Chosen: robots
-that push a wall for a tenth of their drive stay below a tenth."""
+STRANGE_MAX = 0.1
+"""Share of outliers among readings near walls up to which a fit is one. Chosen: of
+emulated robots, some of which touch walls, it is below 0.01."""
+
+JUMP = (0.03, 0.1)
+"""Way [m] and turn [rad] in a control step beyond which a robot was moved. Chosen.
+
+A robot that pushes a wall stands for 0.013 m, and its slip is a tenth of that.
+"""
 
 
 @dataclass(frozen=True)
@@ -83,6 +90,21 @@ class Quantity:
     after: float
 
 
+@dataclass(frozen=True)
+class Jump:
+    """A move that neither wheels nor slip explain.
+
+    Attributes:
+        time: when [s].
+        way: how far [m].
+        turn: by what angle [rad].
+    """
+
+    time: float
+    way: float
+    turn: float
+
+
 @dataclass(frozen=True, eq=False)
 class DriveFit:
     """A robot as a drive shows it.
@@ -96,6 +118,7 @@ class DriveFit:
         start: most likely start: x, y [m], yaw [rad], `(3,)`.
         turned: by all turns, back and forth alike [rad].
         n_near: readings of each sensor near a wall, `(8,)`.
+        jump: the largest, if the robot seems to have been moved.
         quantities: how well it explains the drive.
     """
 
@@ -107,6 +130,7 @@ class DriveFit:
     start: np.ndarray
     turned: float
     n_near: np.ndarray
+    jump: Jump | None
     quantities: tuple[Quantity, ...]
 
 
@@ -127,8 +151,9 @@ def fit_drive(drive: RecordedDrive, scene: Scene, known: Calibration) -> DriveFi
         late = known.latency * drive.control_step
         delay = replace(delay, delay=late, latency=known.latency)
     plan = plan_of(scene, SIGHT, drive.control_step)
-    model = DriveModel(drive, plan, delay.delay, FIRST_SLIP)
+    model = DriveModel(drive, plan, delay.delay, FIRST_SLIP, 0, len(drive.time) - 1)
     before = parameters_of(known)
+    prior = Prior(drive.start, before)
     near = (drive.counts > FAR) & (drive.counts < SATURATED)
     try:
         model, joint = _likeliest(model, before)
@@ -144,11 +169,11 @@ def fit_drive(drive: RecordedDrive, scene: Scene, known: Calibration) -> DriveFi
             )
         held = np.where(shown, joint.parameters, before)
         after = smooth(
-            model, replace(joint, parameters=held), before, shown, loss=CAUCHY
+            model, replace(joint, parameters=held), prior, shown, loss=CAUCHY
         )
         nothing = np.zeros(N_PARAMETERS, bool)
         unfitted = smooth(
-            model, replace(joint, parameters=before), before, nothing, loss=CAUCHY
+            model, replace(joint, parameters=before), prior, nothing, loss=CAUCHY
         )
     except LinAlgError:
         raise _strange(1.0, drive) from None
@@ -161,6 +186,7 @@ def fit_drive(drive: RecordedDrive, scene: Scene, known: Calibration) -> DriveFi
         start=after.poses[0],
         turned=float(np.abs(np.diff(after.poses[:, 2])).sum()),
         n_near=near.sum(axis=0),
+        jump=_jump(model, after),
         quantities=(
             _motor_steps(drive, known.latency, delay.latency),
             *_paths(model, unfitted, after),
@@ -176,7 +202,7 @@ def _likeliest(model: DriveModel, known: np.ndarray) -> tuple[DriveModel, Smooth
     best = None
     for slip in SLIPS:
         model = replace(model, slip=slip)
-        found = smooth(model, found, known, free, loss=CAUCHY)
+        found = smooth(model, found, Prior(model.drive.start, known), free, loss=CAUCHY)
         if best is None or found.evidence > best[1].evidence:
             best = model, found
     assert best is not None
@@ -191,6 +217,18 @@ def _refuse_strange(model: DriveModel, found: Smoothed, near: np.ndarray) -> Non
         share = float((np.abs(left[concerned]) > OUTLIER).mean())
         if share > STRANGE_MAX:
             raise _strange(share, model.drive)
+
+
+def _jump(model: DriveModel, found: Smoothed) -> Jump | None:
+    path = np.diff(found.poses, axis=0)
+    way, turn = model.moved(found.parameters).T
+    way = np.abs(np.hypot(path[:, 0], path[:, 1]) - np.abs(way))
+    turn = np.abs(path[:, 2] - turn)
+    sizes = np.maximum(way / JUMP[0], turn / JUMP[1])
+    worst = int(sizes.argmax())
+    if sizes[worst] <= 1:
+        return None
+    return Jump(float(model.time[worst]), float(way[worst]), float(turn[worst]))
 
 
 def _strange(share: float, drive: RecordedDrive) -> UserError:

@@ -5,7 +5,7 @@ readings the counters say how the robot moved; at each reading the walls of the 
 say, through the sensors, where it was. What both leave is divided by what it may be.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -57,14 +57,17 @@ AGE_SPREAD = PROXIMITY_PERIOD / 12**0.5
 WHOLE_STEP = 6**-0.5
 """Standard deviation of a difference of two counters, which are whole [steps]."""
 
-ASIDE = 0.0002
+ASIDE = 0.0001
 """Standard deviation of slip to the side in a control step [m]. Chosen."""
 
-BENT = 0.1
-"""Part of its lateral way by which a path may differ from an arc. Chosen."""
+BENT = 0.03
+"""Part of way times turn by which a path may differ from two arcs. Chosen."""
 
-NUDGE = 1e-6
-"""Change of poses [m, rad] by which slopes of rays are measured."""
+NUDGE, LAG_NUDGE = 1e-6, 1e-4
+"""Change of poses [m, rad] and of the lag by which slopes are measured."""
+
+STILL = 1e-3
+"""Change of speed [m/s] below which a wheel's is constant: a motor's is a hundredth."""
 
 
 def parameters_of(calibration: Calibration) -> np.ndarray:
@@ -104,67 +107,112 @@ class Linearised:
 
 
 @dataclass(frozen=True, eq=False)
+class Wheels:
+    """What the wheels do with a lag, ahead and around: first axes of 2.
+
+    Attributes:
+        ways: steps that count between readings, `(2, T, 2)`: a body that lags is behind
+            its counters by its lag's worth of way, and what old readings saw is behind
+            by their age's.
+        rates: at the readings [steps/s], `(2, T + 1, 2)`.
+    """
+
+    ways: np.ndarray
+    rates: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class DriveModel:
-    """A recorded drive in an arena.
+    """A recorded drive in an arena, or a part of it.
 
     Attributes:
         drive: what was recorded.
         plan: of robot and arena.
         delay: of commands [s].
         slip: relative standard deviation of a wheel's way in a control step.
+        first: first reading of the part.
+        last: last one.
     """
 
     drive: RecordedDrive
     plan: Plan
     delay: float
     slip: float
-    _ways: dict[float, np.ndarray] = field(default_factory=dict)
+    first: int
+    last: int
+    _wheels: dict[float, Wheels] = field(default_factory=dict)
 
-    def until(self, n: int) -> "DriveModel":
-        """The model of the first `n` readings."""
-        whole = self.drive
-        part = RecordedDrive(
-            whole.time[:n], whole.steps[:n], whole.rates[: n - 1], whole.counts[:n],
-            whole.start,
-        )  # fmt: skip
-        ways = {lag: way[:, : n - 1] for lag, way in self._ways.items()}
-        return DriveModel(part, self.plan, self.delay, self.slip, ways)
+    def part(self, first: int, last: int) -> "DriveModel":
+        """The model of the readings from `first` to `last`."""
+        return replace(self, first=first, last=last)
 
-    def ways(self, lag: float) -> np.ndarray:
-        """Steps that count between readings, ahead and around, `(2, T, 2)`.
+    @property
+    def time(self) -> np.ndarray:
+        """Of the readings [s], `(T + 1,)`."""
+        return self.drive.time[self.first : self.last + 1]
 
-        A body that lags is behind its counters by its lag's worth of way, and what old
-        readings saw is behind by their age's.
-        """
-        if lag not in self._ways:
+    def wheels(self, lag: float) -> Wheels:
+        """What the wheels do if the lag is so much of the nominal robot's."""
+        if lag not in self._wheels:
             # a fit comes back to few
-            if len(self._ways) > 50:
-                self._ways.clear()
-            found = []
+            if len(self._wheels) > 20:
+                self._wheels.clear()
+            rates, ways = [], []
             for nominal in self.plan.lag.tolist():
                 time = max(lag, 1e-3) * nominal
-                rates = lagged_rates(self.drive, self.delay, time)
-                behind = (lag * nominal + MEAN_AGE) * rates
-                found.append(np.diff(self.drive.steps - behind, axis=0))
-            self._ways[lag] = np.array(found)
-        return self._ways[lag]
+                rates.append(lagged_rates(self.drive, self.delay, time))
+                behind = (lag * nominal + MEAN_AGE) * rates[-1]
+                ways.append(np.diff(self.drive.steps - behind, axis=0))
+            self._wheels[lag] = Wheels(np.array(ways), np.array(rates))
+        whole = self._wheels[lag]
+        return Wheels(
+            whole.ways[:, self.first : self.last],
+            whole.rates[:, self.first : self.last + 1],
+        )
 
     def moved(self, parameters: np.ndarray) -> np.ndarray:
         """Way ahead [m] and turn [rad] between readings by the counters, `(T, 2)`."""
-        radii = STEP_ANGLE * WHEEL_RADIUS * np.exp(parameters[[LEFT, RIGHT]])
-        ahead, around = self.ways(float(parameters[LAG])) * radii
-        track = TRACK * np.exp(parameters[OWN_TRACK])
-        return np.stack(
-            [ahead.mean(axis=-1), (around[:, 1] - around[:, 0]) / track], axis=-1
-        )
+        return _ahead_and_around(self.wheels(float(parameters[LAG])).ways, parameters)
+
+    def shifts(self, parameters: np.ndarray) -> np.ndarray:
+        """What a path between readings is beside an arc's chord [m], `(T, 2)`: x, y.
+
+        A command changes the speeds somewhere between two readings. So there are two
+        arcs, the first with the speeds at its start; x is the chord's direction.
+        """
+        wheels = self.wheels(float(parameters[LAG]))
+        moved = _ahead_and_around(wheels.ways, parameters)
+        speeds = _ahead_and_around(wheels.rates, parameters)
+        before, change = speeds[:-1], np.diff(speeds, axis=0)
+        period = np.diff(self.time)[:, None]
+        # by whichever changes more, as wheels feel it
+        feels = np.abs(change * (1.0, TRACK / 2))
+        column = feels.argmax(axis=1)[:, None]
+        top = np.take_along_axis(before + change - moved / period, column, 1)
+        bottom = np.take_along_axis(change, column, 1)
+        still = np.take_along_axis(feels, column, 1) < STILL
+        share = np.where(still, 0.0, top / np.where(still, 1.0, bottom))
+        first = before * period * np.clip(share, 0.0, 1.0)
+        second = moved - first
+        found = np.zeros(moved.shape)
+        for arc, middle in (
+            (first, (first[:, 1] - moved[:, 1]) / 2),
+            (second, (moved[:, 1] - second[:, 1]) / 2),
+        ):
+            chord = _chord(arc)
+            found += np.stack([chord * np.cos(middle), chord * np.sin(middle)], -1)
+        found[:, 0] -= _chord(moved)
+        return found
 
     def path(self, start: np.ndarray, parameters: np.ndarray) -> np.ndarray:
         """Poses `(T + 1, 3)` by the counters alone, from a start `(3,)`."""
-        way, turn = self.moved(parameters).T
-        yaw = start[2] + np.concatenate([[0.0], np.cumsum(turn)])
-        chord, middle = way * np.sinc(turn / (2 * np.pi)), yaw[:-1] + turn / 2
-        x = start[0] + np.concatenate([[0.0], np.cumsum(chord * np.cos(middle))])
-        y = start[1] + np.concatenate([[0.0], np.cumsum(chord * np.sin(middle))])
+        moved, shifts = self.moved(parameters), self.shifts(parameters)
+        yaw = start[2] + np.concatenate([[0.0], np.cumsum(moved[:, 1])])
+        ahead, aside = _chord(moved) + shifts[:, 0], shifts[:, 1]
+        middle = yaw[:-1] + moved[:, 1] / 2
+        cos, sin = np.cos(middle), np.sin(middle)
+        x = start[0] + np.concatenate([[0.0], np.cumsum(ahead * cos - aside * sin)])
+        y = start[1] + np.concatenate([[0.0], np.cumsum(ahead * sin + aside * cos)])
         return np.stack([x, y, yaw], axis=-1)
 
     def distances(self, poses: np.ndarray) -> np.ndarray:
@@ -188,38 +236,34 @@ class DriveModel:
         ahead, aside = cos * dx + sin * dy, cos * dy - sin * dx
         bend = 1 / np.sinc(turned / (2 * np.pi))
         way, turn = self.moved(parameters).T
+        longer, beside = self.shifts(parameters).T
         # by x, y, half of the yaws' sum, their difference
         slopes = np.zeros((3, n, 4))
         slopes[0] = np.stack([cos * bend, sin * bend, aside * bend, way * turn / 12], 1)
         slopes[1, :, 3] = 1.0
         slopes[2, :, :3] = np.stack([-sin, cos, -ahead], axis=-1)
-        left = np.stack([ahead * bend - way, turned - turn, aside])
+        left = np.stack([ahead * bend - longer - way, turned - turn, aside - beside])
         # by the parameters
         by = np.zeros((3, n, N_PARAMETERS))
-        radii = STEP_ANGLE * WHEEL_RADIUS * np.exp(parameters[[LEFT, RIGHT]])
-        own = self.ways(float(parameters[LAG])) * radii
-        track = TRACK * np.exp(parameters[OWN_TRACK])
+        own = self.wheels(float(parameters[LAG])).ways * _step_lengths(parameters)
         by[0][:, [LEFT, RIGHT]] = -own[0] / 2
-        by[1][:, [LEFT, RIGHT]] = own[1] * (1, -1) / track
+        by[1][:, [LEFT, RIGHT]] = own[1] * (1, -1) / _track(parameters)
         by[1][:, OWN_TRACK] = turn
-        other = parameters.copy()
-        other[LAG] += 1e-4
-        by[:2, :, LAG] = -(self.moved(other) - self.moved(parameters)).T / 1e-4
+        other = parameters + LAG_NUDGE * (np.arange(N_PARAMETERS) == LAG)
+        by[:2, :, LAG] = -(self.moved(other) - self.moved(parameters)).T / LAG_NUDGE
         # what slips are the wheels
-        wheels = np.array([[1, -TRACK / 2, 0], [1, TRACK / 2, 0], [0, 0, 1]])
-        deviation = self._deviations(way, turn)
+        basis = np.array([[1, -TRACK / 2, 0], [1, TRACK / 2, 0], [0, 0, 1]])
+        deviations = self._deviations(way, turn)
+        scale = 1 / deviations
         left, slopes, by = (
-            np.einsum("ij,j...->i...", wheels, each) for each in (left, slopes, by)
+            np.einsum("ij,jk...->ki...", basis, each) for each in (left, slopes, by)
         )
-        scale = (1 / deviation).T
-        left, slopes, by = (
-            (scale.reshape(3, n, *(1,) * (each.ndim - 2)) * each).swapaxes(0, 1)
-            for each in (left, slopes, by)
-        )
+        left = scale * left
+        slopes, by = scale[..., None] * slopes, scale[..., None] * by
         half = slopes[..., 2] / 2
         before = np.stack([-slopes[..., 0], -slopes[..., 1], half - slopes[..., 3]], -1)
         after = np.stack([slopes[..., 0], slopes[..., 1], half + slopes[..., 3]], -1)
-        return left, before, after, by, float(np.log(deviation[:, :2]).sum())
+        return left, before, after, by, float(np.log(deviations[:, :2]).sum())
 
     def _deviations(self, way: np.ndarray, turn: np.ndarray) -> np.ndarray:
         """Standard deviations of the ways of both wheels, and aside [m], `(T, 3)`."""
@@ -231,7 +275,8 @@ class DriveModel:
     def _seen(
         self, poses: np.ndarray, parameters: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        counts, gains = self.drive.counts, parameters[GAINS]
+        counts = self.drive.counts[self.first : self.last + 1]
+        gains = parameters[GAINS]
         distance = self.distances(poses)
         slopes = np.stack(
             [
@@ -249,13 +294,35 @@ class DriveModel:
         silent |= np.isnan(counts)
         known = sensed_distance(used, np.exp(gains))
         noise = np.interp(known, NOISE_DISTANCES, NOISE) / used
-        speed = np.gradient(poses, self.drive.time, axis=0)
+        speed = np.gradient(poses, self.time, axis=0)
         closing = np.einsum("kip,kp->ki", slopes, speed)
         aged = AGE_SPREAD * closing * steepness
         deviation = np.sqrt(noise**2 + CURVE_ERROR**2 + np.minimum(aged**2, 1.0))
         scale = np.where(silent, 0.0, 1 / deviation)
         by_pose = -(scale * steepness)[..., None] * slopes
         return scale * left, by_pose, -scale
+
+
+def _step_lengths(parameters: np.ndarray) -> np.ndarray:
+    """Way of both wheels in a motor step [m], `(2,)`."""
+    return STEP_ANGLE * WHEEL_RADIUS * np.exp(parameters[[LEFT, RIGHT]])
+
+
+def _track(parameters: np.ndarray) -> float:
+    """Track [m]."""
+    return float(TRACK * np.exp(parameters[OWN_TRACK]))
+
+
+def _ahead_and_around(steps: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+    """Way ahead [m] and turn [rad], `(n, 2)`, of steps `(2, n, 2)`: see `Wheels`."""
+    ahead, around = steps * _step_lengths(parameters)
+    turn = (around[:, 1] - around[:, 0]) / _track(parameters)
+    return np.stack([ahead.mean(axis=-1), turn], axis=-1)
+
+
+def _chord(arcs: np.ndarray) -> np.ndarray:
+    """Chords [m], `(n,)`, of arcs `(n, 2)`: their way [m] and turn [rad]."""
+    return arcs[:, 0] * np.sinc(arcs[:, 1] / (2 * np.pi))
 
 
 def curve(distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

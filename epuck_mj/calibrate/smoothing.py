@@ -6,10 +6,10 @@ mujoco.minimize and scipy.optimize would take its cube.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg import LinAlgError, cholesky_banded, cho_solve_banded
+from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
 from epuck_mj.calibrate.drive_model import (
     GAINS,
@@ -36,8 +36,11 @@ PIECE_MAX, PIECE_SHARE = 40, 0.05
 PRECISION = 1e-4
 """Part of its standard error by which a parameter may still change at the end."""
 
-N_ITERATIONS = 40
-"""Most steps of a fit; most take 5 to 10."""
+WINDOW = 600
+"""Readings that are smoothed again as a followed drive grows."""
+
+FEW_ITERATIONS, N_ITERATIONS = 3, 40
+"""Most steps of a fit of a piece, and of a whole drive: most take 5 to 10."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +57,7 @@ def _huber(residuals: np.ndarray) -> np.ndarray:
     return inside * (size - inside / 2)
 
 
-HUBER = Loss(
-    _huber, lambda residuals: OUTLIER / np.maximum(np.abs(residuals), OUTLIER)
-)
+HUBER = Loss(_huber, lambda residuals: OUTLIER / np.maximum(np.abs(residuals), OUTLIER))
 """Outliers pull as hard as OUTLIER, wherever they are: for poses that are far off."""
 
 CAUCHY = Loss(
@@ -67,6 +68,27 @@ CAUCHY = Loss(
 
 
 @dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known before a drive.
+
+    Attributes:
+        start: pose `(3,)`.
+        parameters: `(12,)`.
+    """
+
+    start: np.ndarray
+    parameters: np.ndarray
+
+    def of_start(self, poses: np.ndarray) -> np.ndarray:
+        """Residuals of the start, `(3,)`."""
+        return (poses[0] - self.start) / START_ERROR
+
+    def of(self, parameters: np.ndarray) -> np.ndarray:
+        """Residuals of the parameters, `(12,)`."""
+        return (parameters - self.parameters) / LIKELY
+
+
+@dataclass(frozen=True, eq=False)
 class Smoothed:
     """Poses and parameters that explain a drive best.
 
@@ -74,16 +96,14 @@ class Smoothed:
         poses: at each reading, `(T + 1, 3)`.
         parameters: of the robot, `(12,)`.
         errors: their standard errors, 0 of those held, `(12,)`.
-        cost: half of the sum of squares, outliers less.
         evidence: logarithm of the likelihood of the drive with all poses and
             parameters integrated out (Laplace), up to a constant.
     """
 
     poses: np.ndarray
     parameters: np.ndarray
-    errors: np.ndarray
-    cost: float
-    evidence: float
+    errors: np.ndarray = field(default_factory=lambda: np.full(N_PARAMETERS, np.inf))
+    evidence: float = -np.inf
 
 
 def followed(model: DriveModel, known: np.ndarray, free: np.ndarray) -> Smoothed:
@@ -97,44 +117,31 @@ def followed(model: DriveModel, known: np.ndarray, free: np.ndarray) -> Smoothed
         known: parameters that it begins with, `(12,)`.
         free: which of them are to be fitted, `(12,)`, bool.
     """
-    n = PIECE
-    part = model.until(n)
-    found = Smoothed(
-        part.path(model.drive.start, known), known, np.zeros(N_PARAMETERS), 0.0, 0.0
-    )
-    last = len(model.drive.time)
+    last, first, end = len(model.drive.time) - 1, 0, PIECE
+    begin, likely = model.drive.start, known
+    part = model.part(first, end)
+    poses = part.path(begin, known)
+    parameters = known
     while True:
-        found = smooth(part, found, known, free, 3 if n < last else N_ITERATIONS)
-        if n == last:
-            return found
-        grown = min(last, n + max(PIECE, min(PIECE_MAX, int(n * PIECE_SHARE))))
-        part = model.until(grown)
-        ahead = part.path(model.drive.start, found.parameters)
-        found = replace(
-            found, poses=np.concatenate([found.poses, _onward(found.poses, ahead, n)])
-        )
-        n = grown
-
-
-def _onward(poses: np.ndarray, path: np.ndarray, n: int) -> np.ndarray:
-    """The path from its row `n` on, moved to where the poses end."""
-    turned = poses[-1, 2] - path[n - 1, 2]
-    x, y = (path[n:, :2] - path[n - 1, :2]).T
-    cos, sin = np.cos(turned), np.sin(turned)
-    return np.stack(
-        [
-            poses[-1, 0] + cos * x - sin * y,
-            poses[-1, 1] + sin * x + cos * y,
-            path[n:, 2] + turned,
-        ],
-        axis=-1,
-    )
+        window = Smoothed(poses[first:], parameters)
+        found = smooth(part, window, Prior(begin, likely), free, FEW_ITERATIONS)
+        poses = np.concatenate([poses[:first], found.poses])
+        parameters = found.parameters
+        if end == last:
+            return Smoothed(poses, parameters)
+        grown = min(last, end + max(PIECE, min(PIECE_MAX, int(end * PIECE_SHARE))))
+        ahead = model.part(end, grown).path(poses[-1], parameters)
+        poses, end = np.concatenate([poses, ahead[1:]]), grown
+        if end - first > WINDOW:
+            first = end - WINDOW
+            begin, likely = poses[first], parameters
+        part = model.part(first, end)
 
 
 def smooth(
     model: DriveModel,
     begin: Smoothed,
-    known: np.ndarray,
+    prior: Prior,
     free: np.ndarray,
     n_iterations: int = N_ITERATIONS,
     loss: Loss = HUBER,
@@ -144,13 +151,12 @@ def smooth(
     Args:
         model: of the drive.
         begin: where to begin.
-        known: parameters as they are likely, `(12,)`.
+        prior: what is known before.
         free: which of them are to be fitted, `(12,)`, bool.
         n_iterations: most steps.
         loss: of residuals.
     """
     poses, parameters = begin.poses, begin.parameters
-    prior = Prior(model.drive.start, known)
     now = model.linearised(poses, parameters)
     cost = _cost(now, prior, poses, parameters, loss)
     damping = 1e-6
@@ -179,28 +185,7 @@ def smooth(
     normal = _normal(now, prior, poses, parameters, free, loss)
     _, _, errors, log_determinant = normal.solved(0.0)
     evidence = -cost - now.log_scales - log_determinant / 2
-    return Smoothed(poses, parameters, errors, cost, evidence)
-
-
-@dataclass(frozen=True, eq=False)
-class Prior:
-    """What is known before a drive.
-
-    Attributes:
-        start: pose `(3,)`.
-        parameters: `(12,)`.
-    """
-
-    start: np.ndarray
-    parameters: np.ndarray
-
-    def of_start(self, poses: np.ndarray) -> np.ndarray:
-        """Residuals of the start, `(3,)`."""
-        return (poses[0] - self.start) / START_ERROR
-
-    def of(self, parameters: np.ndarray) -> np.ndarray:
-        """Residuals of the parameters, `(12,)`."""
-        return (parameters - self.parameters) / LIKELY
+    return Smoothed(poses, parameters, errors, evidence)
 
 
 def _cost(
@@ -291,9 +276,7 @@ def _normal(
     beside = np.einsum("kip,kiq->kpq", wa, b)
     # each sensor meets its own gain only
     border = np.zeros((n, 3, N_PARAMETERS))
-    border[:, :, GAINS] = np.einsum(
-        "kip,ki->kpi", now.seen_pose, seen * now.seen_gains
-    )
+    border[:, :, GAINS] = np.einsum("kip,ki->kpi", now.seen_pose, seen * now.seen_gains)
     border = border[..., free]
     border[:-1] += np.einsum("kip,kiq->kpq", wa, c)
     border[1:] += np.einsum("kip,kiq->kpq", wb, c)

@@ -62,7 +62,9 @@ class DisturbedRobots:
         self._of, self._k = given.of, 0
         # the robot stands: older commands were 0
         self._sent = np.zeros((len(starts), given.latency.max() + 1, 2))
-        self._robots.embody(given.mass[given.of], given.friction[given.of])
+        self._robots.embody(
+            given.mass[given.of], given.friction[given.of], given.lag[given.of]
+        )
         reading = self._robots.reset(starts)
         self._before = reading.distance
         self._before = np.where(self._before > PROXIMITY_REACH, -1.0, self._before)

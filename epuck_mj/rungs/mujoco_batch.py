@@ -78,12 +78,14 @@ class MujocoRobots:
             )
         return self._reading()
 
-    def embody(self, mass: np.ndarray, friction: np.ndarray) -> None:
+    def embody(self, mass: np.ndarray, friction: np.ndarray, lag: np.ndarray) -> None:
         """See `Simulator.embody`."""
         n, changes = len(mass), wheel_limits(self.scene, len(mass))
-        others = self._embodied or (mass != 1).any() or (friction != 1).any()
+        others = self._embodied or any(
+            (each != 1).any() for each in (mass, friction, lag)
+        )
         if others:
-            changes |= body_fields(self.scene, mass, friction)
+            changes |= body_fields(self.scene, mass, friction, lag)
         for name, (where, values) in changes.items():
             self._batch.expand(name)[:n, where] = values
         if others:
@@ -94,7 +96,7 @@ class MujocoRobots:
     def disembody(self) -> None:
         """See `Simulator.disembody`."""
         if self._embodied:
-            self.embody(np.ones(self.capacity), np.ones(self.capacity))
+            self.embody(*np.ones((3, self.capacity)))
             self._embodied = False
 
     def keep(self, mask: np.ndarray) -> None:

@@ -14,7 +14,7 @@ class Simulator(Robots, Protocol):
 
     capacity: int
 
-    def embody(self, mass: np.ndarray, friction: np.ndarray) -> None:
+    def embody(self, mass: np.ndarray, friction: np.ndarray, lag: np.ndarray) -> None:
         """Give the robots bodies of their own, from the next reset on.
 
         Their wheels may turn faster than a firmware would ask for: larger ones do.
@@ -22,6 +22,7 @@ class Simulator(Robots, Protocol):
         Args:
             mass: of each robot against the scene's, `(robots,)`.
             friction: of all but its shell, likewise.
+            lag: of its drive's time constants, likewise.
         """
         ...
 

@@ -44,7 +44,7 @@ class KinematicRobots:
         self._threads = threads
         self._time = scene.n_substeps * scene.model.opt.timestep
         self._plan = plan_of(scene, ENDLESS, self._time)
-        self._mass = np.ones(capacity)
+        self._mass, self._lag = np.ones((2, capacity))
         self._spare = 1.0
         self._states = np.zeros((0, N_STATE))
         self._lags = np.zeros((0, 4))
@@ -60,7 +60,8 @@ class KinematicRobots:
                 f"expected at most {self.capacity} starts, got {len(starts)}"
             )
         self._states = at_rest(starts)
-        self._lags = lags(self._plan, self._mass[: len(starts)], self._time)
+        n = len(starts)
+        self._lags = lags(self._plan, self._mass[:n], self._lag[:n], self._time)
         distance, contact = self._empty()
         touch_all(self._plan, self._states, contact)
         sense_all(self._plan, self._states, ENDLESS, distance)
@@ -102,13 +103,15 @@ class KinematicRobots:
         """Distances from the active robots to the nearest wall [m], `(active,)`."""
         return self._probe.measure(self.poses()).distance
 
-    def embody(self, mass: np.ndarray, friction: np.ndarray) -> None:
+    def embody(self, mass: np.ndarray, friction: np.ndarray, lag: np.ndarray) -> None:
         """See `Simulator.embody`; wheels that roll have no friction to lose."""
         self._mass, self._spare = np.asarray(mass, float), SPARE_SPEED
+        self._lag = np.asarray(lag, float)
 
     def disembody(self) -> None:
         """See `Simulator.disembody`."""
         self._mass, self._spare = np.ones(self.capacity), 1.0
+        self._lag = np.ones(self.capacity)
 
     @cached_property
     def _probe(self) -> ClearanceProbe:
@@ -134,15 +137,19 @@ def substeps(control_step: float) -> tuple[int, float]:
     return n, control_step / n
 
 
-def lags(plan: Plan, mass: np.ndarray, control_step: float) -> np.ndarray:
-    """What `kernel.move` needs to know of the lags of robots with masses `(n,)`.
+def lags(
+    plan: Plan, mass: np.ndarray, lag: np.ndarray, control_step: float
+) -> np.ndarray:
+    """What `kernel.move` needs to know of the lags of robots, `(n, 4)`.
 
     Args:
-        plan: of a robot whose mass is 1.
-        mass: against that robot's.
+        plan: of a robot whose mass and lag are 1.
+        mass: against that robot's, `(n,)`.
+        lag: of the time constants, likewise.
         control_step: its duration [s].
     """
     _, substep = substeps(control_step)
-    lag = plan.massless + mass[:, None] * (plan.lag - plan.massless)
-    left = exp(-substep / lag)
-    return np.stack([left, (1.0 - left) * lag], axis=-1).reshape(-1, 4)
+    own = plan.massless + mass[:, None] * (plan.lag - plan.massless)
+    own = lag[:, None] * own
+    left = exp(-substep / own)
+    return np.stack([left, (1.0 - left) * own], axis=-1).reshape(-1, 4)
