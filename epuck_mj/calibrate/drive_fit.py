@@ -64,11 +64,12 @@ STRANGE_MAX = 0.1
 """Share of outliers among readings near walls up to which a fit is one. Chosen: of
 emulated robots, some of which touch walls, it is below 0.01."""
 
-JUMP = (0.03, 0.1)
-"""Way [m] and turn [rad] in a control step beyond which a robot was moved. Chosen.
+JUMP = (0.03, 0.2)
+"""Way [m] and turn [rad] in a control step beyond which a robot was moved. Chosen: at
+full speed, one that pushes a wall stands for 0.013 m."""
 
-A robot that pushes a wall stands for 0.013 m, and its slip is a tenth of that.
-"""
+JUMP_MAX = (0.1, 1.0)
+"""The same beyond which nothing can be told from a drive. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -220,6 +221,11 @@ def _refuse_strange(model: DriveModel, found: Smoothed, near: np.ndarray) -> Non
 
 
 def _jump(model: DriveModel, found: Smoothed) -> Jump | None:
+    """The largest move that wheels do not explain, if it is one.
+
+    Raises:
+        UserError: if no robot moves so far.
+    """
     path = np.diff(found.poses, axis=0)
     way, turn = model.moved(found.parameters).T
     way = np.abs(np.hypot(path[:, 0], path[:, 1]) - np.abs(way))
@@ -228,7 +234,15 @@ def _jump(model: DriveModel, found: Smoothed) -> Jump | None:
     worst = int(sizes.argmax())
     if sizes[worst] <= 1:
         return None
-    return Jump(float(model.time[worst]), float(way[worst]), float(turn[worst]))
+    jump = Jump(float(model.time[worst]), float(way[worst]), float(turn[worst]))
+    if jump.way > JUMP_MAX[0] or jump.turn > JUMP_MAX[1]:
+        raise UserError(
+            f"expected a drive in one piece; {jump.time:.1f} s after its start the "
+            f"robot would have jumped by {1000 * jump.way:.0f} mm and "
+            f"{np.degrees(jump.turn):.0f} degrees: another --arena, another start "
+            "(--pose), or somebody moved it"
+        )
+    return jump
 
 
 def _strange(share: float, drive: RecordedDrive) -> UserError:

@@ -167,6 +167,6 @@ def _values(drive: "RecordedDrive", known: Calibration, found: "DriveFit") -> li
 def _line(value: _Value) -> str:
     before = f"{value.name:24}{value.before:10.{value.digits}f}"
     if not value.shown:
-        return f"{before}{'kept':>10}{'':8} {value.unit:14}not shown: {value.why}"
+        return f"{before}{'kept':>10}  not shown: {value.why}"
     error = f"{value.error:8.{max(value.digits, 2)}f}"
     return f"{before}{value.fitted:10.{value.digits}f}{error} {value.unit}".rstrip()

@@ -33,8 +33,15 @@ PIECE = 5
 PIECE_MAX, PIECE_SHARE = 40, 0.05
 """Readings by which a followed drive grows: its share, within these limits."""
 
-PRECISION = 1e-4
-"""Part of its standard error by which a parameter may still change at the end."""
+PRECISION, GAIN = 1e-4, 1e-3
+"""Part of its standard error by which a parameter may still change at the end, and what
+that may still gain."""
+
+DAMPING, DAMPING_MAX = 1e-6, 1e6
+"""First and largest damping of steps, relative to the diagonal."""
+
+ROUNDING = 1e-9
+"""Part of a cost that is none."""
 
 WINDOW = 600
 """Readings that are smoothed again as a followed drive grows."""
@@ -156,51 +163,74 @@ def smooth(
         n_iterations: most steps.
         loss: of residuals.
     """
-    poses, parameters = begin.poses, begin.parameters
-    now = model.linearised(poses, parameters)
-    cost = _cost(now, prior, poses, parameters, loss)
-    damping = 1e-6
+    here = _at(model, prior, begin.poses, begin.parameters, loss)
+    damping = DAMPING
     for _ in range(n_iterations):
-        normal = _normal(now, prior, poses, parameters, free, loss)
-        better = False
-        while not better and damping < 1e6:
-            try:
-                pose_step, step, errors, _ = normal.solved(damping)
-            except LinAlgError:
-                damping *= 10
-                continue
-            other = poses + pose_step, parameters + step
-            other[1][LAG] = max(other[1][LAG], 0.0)
-            there = model.linearised(*other)
-            cost_there = _cost(there, prior, *other, loss)
-            better = cost_there < cost + 1e-9 * abs(cost)
-            damping = max(damping / 10, 1e-9) if better else damping * 10
-        if not better:
+        normal = _normal(here, prior, free, loss)
+        there, damping, settled = _better(model, prior, here, normal, damping, loss)
+        if there is None:
             break
-        gained = cost - cost_there
-        poses, parameters, now, cost = *other, there, cost_there
-        small = np.abs(step) <= PRECISION * np.maximum(errors, 1e-9)
-        if small.all() and gained < 1e-3:
+        settled = settled and here.cost - there.cost < GAIN
+        here = there
+        if settled:
             break
-    normal = _normal(now, prior, poses, parameters, free, loss)
-    _, _, errors, log_determinant = normal.solved(0.0)
-    evidence = -cost - now.log_scales - log_determinant / 2
-    return Smoothed(poses, parameters, errors, evidence)
+    solution = _normal(here, prior, free, loss).solved(0.0)
+    evidence = -here.cost - here.linear.log_scales - solution.log_determinant / 2
+    return Smoothed(here.poses, here.parameters, solution.errors, evidence)
 
 
-def _cost(
-    now: Linearised,
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Poses and parameters, the model linearised there, and what they cost."""
+
+    poses: np.ndarray
+    parameters: np.ndarray
+    linear: Linearised
+    cost: float
+
+
+def _at(
+    model: DriveModel,
     prior: Prior,
     poses: np.ndarray,
     parameters: np.ndarray,
     loss: Loss,
-) -> float:
-    total = 0.5 * float(
+) -> _Place:
+    linear = model.linearised(poses, parameters)
+    cost = 0.5 * float(
         (prior.of_start(poses) ** 2).sum() + (prior.of(parameters) ** 2).sum()
     )
-    return total + sum(
-        float(loss.cost(residuals).sum()) for residuals in (now.motion, now.seen)
-    )
+    for residuals in (linear.motion, linear.seen):
+        cost += float(loss.cost(residuals).sum())
+    return _Place(poses, parameters, linear, cost)
+
+
+def _better(
+    model: DriveModel,
+    prior: Prior,
+    here: _Place,
+    normal: "Normal",
+    damping: float,
+    loss: Loss,
+) -> tuple[_Place | None, float, bool]:
+    """A better place, the next damping, and whether the parameters have settled.
+
+    None if no step is better, however small.
+    """
+    while damping < DAMPING_MAX:
+        try:
+            solution = normal.solved(damping)
+        except LinAlgError:
+            damping *= 10
+            continue
+        parameters = here.parameters + solution.step
+        parameters[LAG] = max(parameters[LAG], 0.0)
+        there = _at(model, prior, here.poses + solution.pose_step, parameters, loss)
+        if there.cost < here.cost + ROUNDING * abs(here.cost):
+            settled = np.abs(solution.step) <= PRECISION * solution.errors
+            return there, max(damping / 10, DAMPING / 1000), bool(settled.all())
+        damping *= 10
+    return None, damping, True
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,10 +255,8 @@ class Normal:
     slope: np.ndarray
     free: np.ndarray
 
-    def solved(
-        self, damping: float
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-        """Steps of poses and parameters, standard errors, log determinant.
+    def solved(self, damping: float) -> "Solution":
+        """The least squares step.
 
         Args:
             damping: of the diagonal, relative to it.
@@ -254,17 +282,28 @@ class Normal:
         errors = np.zeros(N_PARAMETERS)
         errors[self.free] = np.sqrt(np.diag(covariance))
         determinant = 2 * float(np.log(factor[0]).sum()) + float(log_corner)
-        return poses.reshape(-1, 3), step, errors, determinant
+        return Solution(poses.reshape(-1, 3), step, errors, determinant)
 
 
-def _normal(
-    now: Linearised,
-    prior: Prior,
-    poses: np.ndarray,
-    parameters: np.ndarray,
-    free: np.ndarray,
-    loss: Loss,
-) -> Normal:
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A solution of normal equations.
+
+    Attributes:
+        pose_step: by which poses change, `(T + 1, 3)`.
+        step: by which parameters change, `(12,)`.
+        errors: standard errors of the parameters, 0 of those held, `(12,)`.
+        log_determinant: logarithm of the matrix's determinant.
+    """
+
+    pose_step: np.ndarray
+    step: np.ndarray
+    errors: np.ndarray
+    log_determinant: float
+
+
+def _normal(here: _Place, prior: Prior, free: np.ndarray, loss: Loss) -> Normal:
+    now, poses, parameters = here.linear, here.poses, here.parameters
     n = len(poses)
     moved, seen = loss.weights(now.motion), loss.weights(now.seen)
     a, b, c = now.motion_from, now.motion_to, now.motion_parameters[..., free]
