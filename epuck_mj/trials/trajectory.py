@@ -80,6 +80,12 @@ class Trajectory:
                 )
 
     @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Its arrays by name, without those that it has not."""
+        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: array for name, array in arrays.items() if array is not None}
+
+    @property
     def steps(self) -> int:
         """Control steps lived, the crash step included."""
         return self.fitness.size
@@ -105,10 +111,8 @@ class Trajectory:
         Raises:
             UserError: if it cannot be written.
         """
-        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
-        there = {name: array for name, array in arrays.items() if array is not None}
         with writing():
-            write_arrays(Path(path), {"format": np.array(FORMAT), **there})
+            write_arrays(Path(path), {"format": np.array(FORMAT), **self.arrays})
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
