@@ -1,6 +1,7 @@
 """Calibration: the sensor gains, wheels and delays of one robot.
 
-Made by `python -m epuck_mj.calibrate`, read by simulation and bridge alike.
+Made by `python -m epuck_mj.calibrate`, measured or fitted to a log; read by simulation
+and bridge alike.
 """
 
 from dataclasses import dataclass, fields
