@@ -21,19 +21,18 @@ from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.calibrate.__main__ import calibrate
 from epuck_mj.calibrate.command_delay import fit_delay, lagged_rates, told_steps
 from epuck_mj.calibrate.drive_fit import ERRORS_MAX, fit_drive
-from epuck_mj.calibrate.drive_model import (
+from epuck_mj.calibrate.drive_model import SIGHT, DriveModel, curve
+from epuck_mj.calibrate.normal_equations import Normal
+from epuck_mj.calibrate.parameters import (
     GAINS,
     LAG,
     N_PARAMETERS,
     OWN_TRACK,
     RIGHT,
-    SIGHT,
-    DriveModel,
-    curve,
     parameters_of,
 )
 from epuck_mj.calibrate.recorded_drive import RecordedDrive, load_drive
-from epuck_mj.calibrate.smoothing import CAUCHY, HUBER, Normal
+from epuck_mj.calibrate.smoothing import CAUCHY, HUBER
 from epuck_mj.constants import N_PROXIMITY, PROXIMITY_COUNT_MAX, TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.policies.wall_follower import WallFollower
@@ -416,6 +415,17 @@ def test_another_arena_is_refused(a_drive, tmp_path, arena, message):
         fitted(log, "--arena", arena, "--output", output)
     assert "\n" not in str(caught.value)
     assert not output.exists()
+
+
+def test_an_arena_without_outlines_is_refused(a_drive, tmp_path):
+    log, arena = tmp_path / "drive.npz", tmp_path / "leaning.xml"
+    a_drive[0].save(log)
+    leaning = '<geom type="cylinder" size="0.02 0.2" euler="30 0 0" pos="0.3 0 0"/>'
+    floor = '<geom type="plane" size="1 1 0.1"/>'
+    arena.write_text(f"<mujoco><worldbody>{floor}{leaning}</worldbody></mujoco>")
+    with pytest.raises(UserError, match="a fit needs exact outlines") as caught:
+        fitted(log, "--arena", arena, "--output", tmp_path / "robot.yaml")
+    assert "--robot" not in str(caught.value)
 
 
 def test_a_robot_that_no_e_puck_is(a_drive, tmp_path):

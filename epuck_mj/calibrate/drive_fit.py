@@ -5,19 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import LinAlgError
 
-from epuck_mj.calibrate.command_delay import CommandDelay, fit_delay, told_steps
-from epuck_mj.calibrate.drive_model import (
-    FAR,
-    GAINS,
-    LAG,
-    LEFT,
-    N_PARAMETERS,
-    OWN_TRACK,
-    RIGHT,
-    SIGHT,
-    DriveModel,
-    parameters_of,
-)
+from epuck_mj.calibrate.command_delay import CommandDelay, fit_delay
+from epuck_mj.calibrate.drive_model import FAR, SIGHT, DriveModel
 from epuck_mj.calibrate.fitting import GAINS as GAIN_LIMITS
 from epuck_mj.calibrate.fitting import (
     SATURATED,
@@ -25,6 +14,16 @@ from epuck_mj.calibrate.fitting import (
     checked_wheel_radii,
     refuse_outside,
 )
+from epuck_mj.calibrate.parameters import (
+    GAINS,
+    LAG,
+    LEFT,
+    N_PARAMETERS,
+    OWN_TRACK,
+    RIGHT,
+    parameters_of,
+)
+from epuck_mj.calibrate.quantities import Quantity, motor_steps, paths, readings
 from epuck_mj.calibrate.recorded_drive import RecordedDrive
 from epuck_mj.calibrate.smoothing import (
     CAUCHY,
@@ -36,10 +35,9 @@ from epuck_mj.calibrate.smoothing import (
 )
 from epuck_mj.constants import N_PROXIMITY, TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
-from epuck_mj.rungs.kinematic.plan import plan_of
+from epuck_mj.rungs.kinematic.plan import Plan, plan_of
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.calibration import Calibration
-from epuck_mj.step.sensors import sensed_distance
 
 SLIPS = (0.08, 0.05, 0.03, 0.02, 0.01, 0.005)
 """Relative slip of wheels in a control step: the likeliest is taken.
@@ -70,25 +68,6 @@ full speed, one that pushes a wall stands for 0.013 m."""
 
 JUMP_MAX = (0.1, 1.0)
 """The same beyond which nothing can be told from a drive. Chosen."""
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """How far what was recorded is from what is expected of a robot.
-
-    Attributes:
-        name: of it.
-        unit: of what is left.
-        n: how often it was recorded.
-        before: root mean square of what the known robot leaves.
-        after: of what the fitted one leaves.
-    """
-
-    name: str
-    unit: str
-    n: int
-    before: float
-    after: float
 
 
 @dataclass(frozen=True)
@@ -151,7 +130,7 @@ def fit_drive(drive: RecordedDrive, scene: Scene, known: Calibration) -> DriveFi
     if not delay.known:
         late = known.latency * drive.control_step
         delay = replace(delay, delay=late, latency=known.latency)
-    plan = plan_of(scene, SIGHT, drive.control_step)
+    plan = _plan(scene, drive.control_step)
     model = DriveModel(drive, plan, delay.delay, FIRST_SLIP, 0, len(drive.time) - 1)
     before = parameters_of(known)
     prior = Prior(drive.start, before)
@@ -189,11 +168,20 @@ def fit_drive(drive: RecordedDrive, scene: Scene, known: Calibration) -> DriveFi
         n_near=near.sum(axis=0),
         jump=_jump(model, after),
         quantities=(
-            _motor_steps(drive, known.latency, delay.latency),
-            *_paths(model, unfitted, after),
-            *_readings(model, unfitted, after, near),
+            motor_steps(drive, known.latency, delay.latency),
+            *paths(model, unfitted, after),
+            *readings(model, unfitted, after, near),
         ),
     )
+
+
+def _plan(scene: Scene, control_step: float) -> Plan:
+    try:
+        return plan_of(scene, SIGHT, control_step)
+    except UserError as error:
+        # no other robot helps here
+        reason = str(error).partition("; ")[0]
+        raise UserError(f"{reason}; a fit needs exact outlines") from None
 
 
 def _likeliest(model: DriveModel, known: np.ndarray) -> tuple[DriveModel, Smoothed]:
@@ -273,56 +261,3 @@ def _checked(parameters: np.ndarray, latency: int) -> Calibration:
         latency=latency,
         lag=max(float(parameters[LAG]), LAG_MIN),
     )
-
-
-def _motor_steps(drive: RecordedDrive, before: int, after: int) -> Quantity:
-    made = np.diff(drive.steps, axis=0)
-    left = [
-        made - told_steps(drive, latency * drive.control_step)
-        for latency in (before, after)
-    ]
-    return Quantity(
-        "motor steps in a control step", "steps", made.size, *map(_rms, left)
-    )
-
-
-def _paths(
-    model: DriveModel, before: Smoothed, after: Smoothed
-) -> tuple[Quantity, Quantity]:
-    """Where the counters alone lead, against where the walls say that it was."""
-    ways, turns = [], []
-    for each in (before, after):
-        path = model.path(after.poses[0], each.parameters)
-        off = path - after.poses
-        ways.append(1000 * _rms(np.hypot(off[:, 0], off[:, 1])))
-        turns.append(float(np.degrees(_rms(off[:, 2]))))
-    n = len(after.poses)
-    return (
-        Quantity("path by the counters alone", "mm", n, *ways),
-        Quantity("heading by the counters alone", "degrees", n, *turns),
-    )
-
-
-def _readings(
-    model: DriveModel, before: Smoothed, after: Smoothed, near: np.ndarray
-) -> list[Quantity]:
-    """Distances that the sensors tell, against those to the arena's walls."""
-    left = [
-        sensed_distance(model.drive.counts, np.exp(each.parameters[GAINS]))
-        - model.distances(each.poses)
-        for each in (before, after)
-    ]
-    return [
-        Quantity(
-            f"distance by ps{i}",
-            "mm",
-            int(near[:, i].sum()),
-            *(1000 * _rms(each[near[:, i], i]) for each in left),
-        )
-        for i in range(N_PROXIMITY)
-    ]
-
-
-def _rms(values: np.ndarray) -> float:
-    """Root mean square; NaN of nothing."""
-    return float(np.sqrt((values**2).mean())) if values.size else float("nan")

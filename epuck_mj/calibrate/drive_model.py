@@ -11,12 +11,22 @@ import numpy as np
 
 from epuck_mj.calibrate.command_delay import lagged_rates
 from epuck_mj.calibrate.fitting import SATURATED
+from epuck_mj.calibrate.parameters import (
+    GAINS,
+    LAG,
+    LEFT,
+    N_PARAMETERS,
+    OWN_TRACK,
+    RIGHT,
+    ahead_and_around,
+    step_lengths,
+    track,
+)
 from epuck_mj.calibrate.recorded_drive import RecordedDrive
 from epuck_mj.constants import N_PROXIMITY, PROXIMITY_PERIOD, TRACK, WHEEL_RADIUS
 from epuck_mj.rungs.kinematic.kernel import sense_all
 from epuck_mj.rungs.kinematic.plan import Plan
 from epuck_mj.rungs.kinematic.robots import at_rest
-from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.motors import STEP_ANGLE
 from epuck_mj.step.sensors import (
     LOG_COUNTS,
@@ -25,12 +35,6 @@ from epuck_mj.step.sensors import (
     PROXIMITY_DISTANCES,
     sensed_distance,
 )
-
-LEFT, RIGHT, OWN_TRACK, LAG = range(4)
-GAINS = slice(4, 4 + N_PROXIMITY)
-N_PARAMETERS = 4 + N_PROXIMITY
-"""Places in the parameters: logarithms of wheel radii, track and gains against the
-nominal robot's, and its lag."""
 
 FAR = 30.0
 """Counts below which a sensor says no more than that nothing is near.
@@ -68,17 +72,6 @@ NUDGE, LAG_NUDGE = 1e-6, 1e-4
 
 STILL = 1e-3
 """Change of speed [m/s] below which a wheel's is constant: a motor's is a hundredth."""
-
-
-def parameters_of(calibration: Calibration) -> np.ndarray:
-    """Parameters `(12,)` of a calibrated robot."""
-    found = np.zeros(N_PARAMETERS)
-    radii = np.array(calibration.wheel_radii)
-    found[[LEFT, RIGHT]] = np.log(radii / WHEEL_RADIUS)
-    found[OWN_TRACK] = np.log(calibration.track / TRACK)
-    found[LAG] = calibration.lag
-    found[GAINS] = np.log(calibration.gains)
-    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +165,7 @@ class DriveModel:
 
     def moved(self, parameters: np.ndarray) -> np.ndarray:
         """Way ahead [m] and turn [rad] between readings by the counters, `(T, 2)`."""
-        return _ahead_and_around(self.wheels(float(parameters[LAG])).ways, parameters)
+        return ahead_and_around(self.wheels(float(parameters[LAG])).ways, parameters)
 
     def shifts(self, parameters: np.ndarray) -> np.ndarray:
         """What a path between readings is beside an arc's chord [m], `(T, 2)`: x, y.
@@ -181,8 +174,8 @@ class DriveModel:
         arcs, the first with the speeds at its start; x is the chord's direction.
         """
         wheels = self.wheels(float(parameters[LAG]))
-        moved = _ahead_and_around(wheels.ways, parameters)
-        speeds = _ahead_and_around(wheels.rates, parameters)
+        moved = ahead_and_around(wheels.ways, parameters)
+        speeds = ahead_and_around(wheels.rates, parameters)
         before, change = speeds[:-1], np.diff(speeds, axis=0)
         period = np.diff(self.time)[:, None]
         # by whichever changes more, as wheels feel it
@@ -245,9 +238,9 @@ class DriveModel:
         left = np.stack([ahead * bend - longer - way, turned - turn, aside - beside])
         # by the parameters
         by = np.zeros((3, n, N_PARAMETERS))
-        own = self.wheels(float(parameters[LAG])).ways * _step_lengths(parameters)
+        own = self.wheels(float(parameters[LAG])).ways * step_lengths(parameters)
         by[0][:, [LEFT, RIGHT]] = -own[0] / 2
-        by[1][:, [LEFT, RIGHT]] = own[1] * (1, -1) / _track(parameters)
+        by[1][:, [LEFT, RIGHT]] = own[1] * (1, -1) / track(parameters)
         by[1][:, OWN_TRACK] = turn
         other = parameters + LAG_NUDGE * (np.arange(N_PARAMETERS) == LAG)
         by[:2, :, LAG] = -(self.moved(other) - self.moved(parameters)).T / LAG_NUDGE
@@ -301,23 +294,6 @@ class DriveModel:
         scale = np.where(silent, 0.0, 1 / deviation)
         by_pose = -(scale * steepness)[..., None] * slopes
         return scale * left, by_pose, -scale
-
-
-def _step_lengths(parameters: np.ndarray) -> np.ndarray:
-    """Way of both wheels in a motor step [m], `(2,)`."""
-    return STEP_ANGLE * WHEEL_RADIUS * np.exp(parameters[[LEFT, RIGHT]])
-
-
-def _track(parameters: np.ndarray) -> float:
-    """Track [m]."""
-    return float(TRACK * np.exp(parameters[OWN_TRACK]))
-
-
-def _ahead_and_around(steps: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-    """Way ahead [m] and turn [rad], `(n, 2)`, of steps `(2, n, 2)`: see `Wheels`."""
-    ahead, around = steps * _step_lengths(parameters)
-    turn = (around[:, 1] - around[:, 0]) / _track(parameters)
-    return np.stack([ahead.mean(axis=-1), turn], axis=-1)
 
 
 def _chord(arcs: np.ndarray) -> np.ndarray:

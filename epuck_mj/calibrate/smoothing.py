@@ -9,22 +9,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+from scipy.linalg import LinAlgError
 
-from epuck_mj.calibrate.drive_model import (
-    GAINS,
-    LAG,
-    N_PARAMETERS,
-    DriveModel,
-    Linearised,
-)
+from epuck_mj.calibrate.drive_model import DriveModel, Linearised
+from epuck_mj.calibrate.normal_equations import Normal
+from epuck_mj.calibrate.parameters import GAINS, LAG, N_PARAMETERS
 
 START_ERROR = np.array([0.01, 0.01, np.radians(5)])
 """Standard deviations of where a person puts a robot: x, y [m], yaw [rad]. Chosen."""
 
 LIKELY = np.array([0.03, 0.03, 0.05, 1.0, *[0.4] * 8])
-"""Standard deviations of parameters from their known values. Chosen: wider than robots
-differ, so that it is the drive that says where they are."""
+"""Standard deviations of parameters from their known values. Chosen: about as much as
+robots differ (`RANGES`), and many times what a drive leaves open."""
 
 OUTLIER = 3.0
 """Residual [standard deviations] from which one counts less than its square."""
@@ -209,7 +205,7 @@ def _better(
     model: DriveModel,
     prior: Prior,
     here: _Place,
-    normal: "Normal",
+    normal: Normal,
     damping: float,
     loss: Loss,
 ) -> tuple[_Place | None, float, bool]:
@@ -231,75 +227,6 @@ def _better(
             return there, max(damping / 10, DAMPING / 1000), bool(settled.all())
         damping *= 10
     return None, damping, True
-
-
-@dataclass(frozen=True, eq=False)
-class Normal:
-    """Normal equations: a band of poses with a border of parameters.
-
-    Attributes:
-        diagonal: `(T + 1, 3, 3)`.
-        beside: of a pose and the next one, `(T, 3, 3)`.
-        border: of poses and free parameters, `(3 (T + 1), f)`.
-        corner: of the parameters, `(f, f)`.
-        pose_slope: `(3 (T + 1),)`.
-        slope: of the free parameters, `(f,)`.
-        free: which parameters those are, `(12,)`.
-    """
-
-    diagonal: np.ndarray
-    beside: np.ndarray
-    border: np.ndarray
-    corner: np.ndarray
-    pose_slope: np.ndarray
-    slope: np.ndarray
-    free: np.ndarray
-
-    def solved(self, damping: float) -> "Solution":
-        """The least squares step.
-
-        Args:
-            damping: of the diagonal, relative to it.
-
-        Raises:
-            LinAlgError: if the matrix is not positive.
-        """
-        band = _band(self.diagonal, self.beside)
-        band[0] *= 1 + damping
-        factor = cholesky_banded(band, lower=True)
-        right = np.column_stack([self.border, self.pose_slope])
-        inverse = cho_solve_banded((factor, True), right)
-        by_border, by_slope = inverse[:, :-1], inverse[:, -1]
-        corner = self.corner + damping * np.diag(np.diag(self.corner))
-        schur = corner - self.border.T @ by_border
-        sign, log_corner = np.linalg.slogdet(schur)
-        if sign <= 0:
-            raise LinAlgError("not positive")
-        covariance = np.linalg.inv(schur)
-        step = np.zeros(N_PARAMETERS)
-        step[self.free] = -covariance @ (self.slope - self.border.T @ by_slope)
-        poses = -(by_slope + by_border @ step[self.free])
-        errors = np.zeros(N_PARAMETERS)
-        errors[self.free] = np.sqrt(np.diag(covariance))
-        determinant = 2 * float(np.log(factor[0]).sum()) + float(log_corner)
-        return Solution(poses.reshape(-1, 3), step, errors, determinant)
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """A solution of normal equations.
-
-    Attributes:
-        pose_step: by which poses change, `(T + 1, 3)`.
-        step: by which parameters change, `(12,)`.
-        errors: standard errors of the parameters, 0 of those held, `(12,)`.
-        log_determinant: logarithm of the matrix's determinant.
-    """
-
-    pose_step: np.ndarray
-    step: np.ndarray
-    errors: np.ndarray
-    log_determinant: float
 
 
 def _normal(here: _Place, prior: Prior, free: np.ndarray, loss: Loss) -> Normal:
@@ -340,16 +267,3 @@ def _normal(here: _Place, prior: Prior, free: np.ndarray, loss: Loss) -> Normal:
         slope,
         free,
     )
-
-
-def _band(diagonal: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """Lower band `(6, 3 n)` of a block-tridiagonal matrix, as LAPACK wants it."""
-    n = len(diagonal)
-    band = np.zeros((6, n, 3))
-    for column in range(3):
-        for row in range(column, 3):
-            band[row - column, :, column] = diagonal[:, row, column]
-        for row in range(3):
-            # the block below the diagonal is the transpose of that beside it
-            band[3 + row - column, :-1, column] = beside[:, column, row]
-    return band.reshape(6, 3 * n)
