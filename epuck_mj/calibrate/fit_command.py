@@ -83,6 +83,8 @@ def report(drive: "RecordedDrive", known: Calibration, found: "DriveFit") -> str
         known: what was known of the robot before.
         found: the fit.
     """
+    from epuck_mj.calibrate.drive_fit import SLIPS
+
     x, y, yaw = found.start.tolist()
     n = len(drive.rates)
     lines = [
@@ -100,7 +102,8 @@ def report(drive: "RecordedDrive", known: Calibration, found: "DriveFit") -> str
         for each in found.quantities
         if each.n
     ]
-    lines.append(f"the wheels slip by about {100 * found.slip:g} % in a control step")
+    about = "at most" if found.slip == min(SLIPS) else "about"
+    lines.append(f"wheels slip by {about} {100 * found.slip:g} % in a control step")
     if found.jump is not None:
         lines.append(
             f"warning: {found.jump.time:.1f} s after the start the robot seems to have "
