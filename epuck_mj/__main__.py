@@ -9,7 +9,7 @@ COMMANDS = {
     "epuck_mj.view": "watch a champion in MuJoCo's own viewer",
     "epuck_mj.bridge": "drive a real e-puck or the emulated one",
     "epuck_mj.bridge.fake": "emulate an e-puck on a serial port",
-    "epuck_mj.calibrate": "measure one robot's sensors and wheels",
+    "epuck_mj.calibrate": "measure one robot, or fit it to its log",
 }
 """Modules that are commands, and what each does."""
 

@@ -25,7 +25,7 @@ from epuck_mj.step.disturbances import (
     draw_calibrated,
     draw_disturbances,
 )
-from epuck_mj.step.motors import wheel_speeds
+from epuck_mj.step.motors import STEP_ANGLE, wheel_speeds
 from epuck_mj.step.sensors import proximity
 from evolution.judging import evaluation
 from evolution.judging.evaluation import BatchEngine, DmControlEngine, Work, evaluate
@@ -92,7 +92,7 @@ def test_draws_stay_in_their_ranges_and_come_from_their_seed():
         again, other = drawn(3000), drawn(3000, seed=1)
         value = getattr(many, field.name)
         np.testing.assert_array_equal(getattr(again, field.name), value)
-        same = field.name in ("of", "known_gains")
+        same = field.name in ("of", "known_gains", "lag")
         assert same or (getattr(other, field.name) != value).any()
 
 
@@ -175,7 +175,7 @@ def test_readings_have_an_age(scene):
 def test_bodies_are_heavier_and_slide():
     scene = load_scene("epuck", "arena", TASK.control_step)
     robots = MujocoRobots(scene, 2, 1)
-    robots.embody(np.array([1.0, 2.0]), np.array([1.0, 0.5]))
+    robots.embody(np.array([1.0, 2.0]), np.array([1.0, 0.5]), np.array([1.0, 2.0]))
     model = scene.model
     body, wheel = model.body(ROBOT_BODY).id, model.geom("epuck/wheel_left").id
     mass, friction = (
@@ -185,9 +185,12 @@ def test_bodies_are_heavier_and_slide():
     np.testing.assert_allclose(friction[:, wheel, 0], [0.9, 0.45])
     shell = model.geom("epuck/shell").id
     np.testing.assert_allclose(friction[:, shell], [model.geom_friction[shell]] * 2)
+    gain = robots._batch.expand("actuator_gainprm")
+    np.testing.assert_allclose(gain[1], model.actuator_gainprm / 2)
     # and the next robots have their own again
-    robots.embody(np.ones(2), np.ones(2))
+    robots.embody(*np.ones((3, 2)))
     np.testing.assert_array_equal(mass, [model.body_mass] * 2)
+    np.testing.assert_array_equal(gain, [model.actuator_gainprm] * 2)
 
 
 @pytest.mark.parametrize("robot", RUNGS)
@@ -246,7 +249,7 @@ CONFIG = ExperimentConfig.from_yaml(
 )
 
 
-CALIBRATION = Calibration((0.7,) * 4 + (1.3,) * 4, (0.0201, 0.0204), 0.055)
+CALIBRATION = Calibration((0.7,) * 4 + (1.3,) * 4, (0.0201, 0.0204), 0.055, 1, 1.5)
 
 
 def test_a_config_keeps_the_calibration_not_its_path(tmp_path):
@@ -275,6 +278,24 @@ def test_a_known_robot_differs_from_one_whose_gains_nobody_knows(scene):
     assert near.any()
     np.testing.assert_allclose(reading.distance[near], reading.truth[near], atol=2e-3)
     assert np.abs(other.distance - reading.truth)[near].min() > 1e-3
+
+
+@pytest.mark.parametrize("lag", [0.5, 2.0])
+def test_a_slower_drive_is_behind_by_its_lag(scene, lag):
+    """Once at speed, it is its way in what its time constant is longer behind."""
+    ahead = np.array([200, 200]) * STEP_ANGLE
+    ends = []
+    for each in (1.0, lag):
+        own = draw_calibrated(
+            Calibration(lag=each), np.random.default_rng(0), 1, 10, QUIET
+        )
+        robots = robots_on(scene, np.array([[-0.3, 0.0, 0.0]]), own)
+        robots.reset(np.array([[-0.3, 0.0, 0.0]]))
+        for _ in range(10):
+            robots.step(ahead[None])
+        ends.append(robots.poses()[0, 0])
+    behind = (lag - 1) * 0.0175 * 200 * STEP_ANGLE * WHEEL_RADIUS
+    assert ends[0] - ends[1] == pytest.approx(behind, rel=0.15)
 
 
 def histories(config, **settings):

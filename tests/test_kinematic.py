@@ -324,7 +324,7 @@ def test_states_keep_their_heading(square):
 
 def test_heavier_robots_lag_longer_and_larger_wheels_may_turn_faster(square):
     robots = KinematicRobots(square, 2)
-    robots.embody(np.array([0.5, 2.0]), np.ones(2))
+    robots.embody(np.array([0.5, 2.0]), np.ones(2), np.ones(2))
     robots.reset(np.array([[0, 0, 0.0], [0, 0.2, 0.0]]))
     robots.step(np.full((2, 2), 7.0))
     light, heavy = robots.poses()[:, 0]

@@ -1,4 +1,4 @@
-"""Calibrate a robot: `python -m epuck_mj.calibrate --port PORT`."""
+"""Calibrate a robot: `python -m epuck_mj.calibrate --port PORT`, or `... fit LOG`."""
 
 import sys
 import time
@@ -21,6 +21,7 @@ from epuck_mj.bridge.line.connect import connect
 from epuck_mj.bridge.line.interfaces import Connection
 from epuck_mj.bridge.line.last_resort import leave_to_last_resort
 from epuck_mj.calibrate.bench import Bench
+from epuck_mj.calibrate.fit_command import fit
 from epuck_mj.calibrate.guide import STEPS, Person
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse, word
@@ -30,11 +31,14 @@ from epuck_mj.host.output import Output, complain, say
 from epuck_mj.step.calibration import Calibration
 
 MODULE = "epuck_mj.calibrate"
+FIT = "fit"
+"""First word of the command line that fits a robot to a log."""
 
 
 EXAMPLES = (
     "python -m epuck_mj.calibrate --port /dev/rfcomm0",
     "python -m epuck_mj.calibrate --port COM5 --only sensors --output robot.yaml",
+    "python -m epuck_mj.calibrate fit runs/drive.npz",
 )
 
 
@@ -42,7 +46,8 @@ EXAMPLES = (
 class Options:
     """Measure how a robot differs from the nominal robot, step by step.
 
-    You need a ruler, a protractor, a flat wall and spacers of 10, 20 and 30 mm.
+    You need a ruler, a protractor, a flat wall and spacers of 10, 20 and 30 mm; or none
+    of them and the log of a drive: see python -m epuck_mj.calibrate fit --help.
 
     Attributes:
         port: port of the robot, as for the bridge.
@@ -83,9 +88,13 @@ def calibrate(argv: Sequence[str], ask: Callable[[str], str] = answer) -> int:
         argv: what was typed.
         ask: shows a question and gives the answer.
     """
+    if argv[:1] == [FIT]:
+        return fit(argv[1:])
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     if not options.port:
-        raise UserError("expected --port, as for python -m epuck_mj.bridge")
+        raise UserError(
+            "expected --port, as for python -m epuck_mj.bridge, or fit and a log"
+        )
     steps = tuple(STEPS) if options.only is None else (options.only,)
     status = calibrate_robot(
         steps,

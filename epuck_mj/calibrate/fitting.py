@@ -124,7 +124,7 @@ def fit_gains(clearances: np.ndarray, counts: np.ndarray) -> SensorFit:
     left = np.where(used, logs - fitted, 0.0)
     gains = np.exp(fitted)
     for number, gain in enumerate(gains):
-        _refuse_outside(f"the gain of ps{number}", float(gain), GAINS, "")
+        refuse_outside(f"the gain of ps{number}", float(gain), GAINS, "")
     return SensorFit(gains, np.sqrt((left**2).sum(axis=0) / n_used), used)
 
 
@@ -162,7 +162,7 @@ def checked_wheel_radii(radii: Sequence[float]) -> tuple[float, float]:
     """
     for name, radius in zip(SIDES, radii, strict=True):
         what = f"a radius of the {name} wheel"
-        _refuse_outside(what, 1000 * radius, _millimetres(RADII), " mm")
+        refuse_outside(what, 1000 * radius, _millimetres(RADII), " mm")
     return radii[0], radii[1]
 
 
@@ -180,13 +180,24 @@ def fit_track(steps: float, wheel_radius: float, angle: float) -> float:
     if angle <= 0:
         raise UserError(f"expected a turn to the left, got {math.degrees(angle):.0f}")
     track = 2 * steps * STEP_ANGLE * wheel_radius / angle
-    _refuse_outside("a track", 1000 * track, _millimetres(TRACKS), " mm")
+    refuse_outside("a track", 1000 * track, _millimetres(TRACKS), " mm")
     return track
 
 
-def _refuse_outside(
+def refuse_outside(
     what: str, value: float, limits: tuple[float, float], unit: str
 ) -> None:
+    """Refuse a measurement beyond limits.
+
+    Args:
+        what: was measured.
+        value: that came of it.
+        limits: lowest and highest value that an e-puck can have.
+        unit: of them, with a space before it.
+
+    Raises:
+        UserError: if it is beyond them.
+    """
     low, high = limits
     if not low <= value <= high:
         raise UserError(

@@ -130,6 +130,8 @@ LIMITS: Mapping[str, Limit] = MappingProxyType(
         # calibration files
         "gain": _above_0(100),
         "length": _above_0(1, "m", LENGTHS),
+        "latency": Limit(0, 100),
+        "lag": _above_0(100),
         # agents
         "num_envs": COUNT,
         "latency": Limit(0, 1000, "control steps"),

@@ -19,13 +19,17 @@ def wheel_limits(scene: Scene, n: int) -> Fields:
     return {"actuator_ctrlrange": (scene.wheels, np.repeat(own[None], n, axis=0))}
 
 
-def body_fields(scene: Scene, mass: np.ndarray, friction: np.ndarray) -> Fields:
-    """Masses, inertias and friction of robots with other bodies.
+def body_fields(
+    scene: Scene, mass: np.ndarray, friction: np.ndarray, lag: np.ndarray
+) -> Fields:
+    """Masses, inertias, friction and servos of robots with other bodies.
 
     Args:
-        scene: whose robot has mass and friction 1.
+        scene: whose robot has mass, friction and lag 1.
         mass: of each robot against the scene's, `(robots,)`.
         friction: of all its geoms but the shell, likewise.
+        lag: of its drive's time constants, likewise: servos of half the gain take
+            twice the time.
     """
     model = scene.model
     robot = model.body_rootid == model.body(ROBOT_BODY).id
@@ -35,4 +39,11 @@ def body_fields(scene: Scene, mass: np.ndarray, friction: np.ndarray) -> Fields:
         "body_mass": (robot, model.body_mass[robot] * mass[:, None]),
         "body_inertia": (robot, model.body_inertia[robot] * mass[:, None, None]),
         "geom_friction": (tyres, model.geom_friction[tyres] * friction[:, None, None]),
+        **{
+            name: (
+                scene.wheels,
+                getattr(model, name)[scene.wheels] / lag[:, None, None],
+            )
+            for name in ("actuator_gainprm", "actuator_biasprm")
+        },
     }

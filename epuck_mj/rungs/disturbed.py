@@ -63,7 +63,9 @@ class DisturbedRobots:
         self._share = given.age / self._control_step
         # the robot stands: older commands were 0
         self._sent = np.zeros((len(starts), given.latency.max() + 1, 2))
-        self._robots.embody(given.mass[given.of], given.friction[given.of])
+        self._robots.embody(
+            given.mass[given.of], given.friction[given.of], given.lag[given.of]
+        )
         reading = self._robots.reset(starts)
         self._before = _within_reach(reading.distance)
         return self._sensed(reading, slice(None))
@@ -86,7 +88,7 @@ class DisturbedRobots:
         """See `Robots.restart`; other disturbances come by `renew`."""
         given, of = self._disturbances, self._of[which]
         self._k[which], self._sent[which] = 0, 0.0
-        self._robots.embody(given.mass[of], given.friction[of], which)
+        self._robots.embody(given.mass[of], given.friction[of], given.lag[of], which)
         reading = self._robots.restart(which, starts)
         self._before[which] = _within_reach(reading.distance)
         return self._sensed(reading, which)

@@ -80,15 +80,21 @@ class MujocoRobots:
         return self._reading(self._active)
 
     def embody(
-        self, mass: np.ndarray, friction: np.ndarray, which: np.ndarray | None = None
+        self,
+        mass: np.ndarray,
+        friction: np.ndarray,
+        lag: np.ndarray,
+        which: np.ndarray | None = None,
     ) -> None:
         """See `Simulator.embody`."""
         changes = wheel_limits(self.scene, len(mass))
         ids = np.arange(len(mass)) if which is None else which
         ids = ids.astype(np.int32)
-        others = self._embodied or (mass != 1).any() or (friction != 1).any()
+        others = self._embodied or any(
+            (each != 1).any() for each in (mass, friction, lag)
+        )
         if others:
-            changes |= body_fields(self.scene, mass, friction)
+            changes |= body_fields(self.scene, mass, friction, lag)
         for name, (where, values) in changes.items():
             places = np.flatnonzero(where) if where.dtype == bool else where
             self._batch.expand(name)[ids[:, None], places] = values
@@ -100,7 +106,7 @@ class MujocoRobots:
     def disembody(self) -> None:
         """See `Simulator.disembody`."""
         if self._embodied:
-            self.embody(np.ones(self.capacity), np.ones(self.capacity))
+            self.embody(*np.ones((3, self.capacity)))
             self._embodied = False
 
     def keep(self, mask: np.ndarray) -> None:

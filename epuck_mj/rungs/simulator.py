@@ -15,7 +15,11 @@ class Simulator(Robots, Protocol):
     capacity: int
 
     def embody(
-        self, mass: np.ndarray, friction: np.ndarray, which: np.ndarray | None = None
+        self,
+        mass: np.ndarray,
+        friction: np.ndarray,
+        lag: np.ndarray,
+        which: np.ndarray | None = None,
     ) -> None:
         """Give the robots bodies of their own, from their next reset or restart on.
 
@@ -24,6 +28,7 @@ class Simulator(Robots, Protocol):
         Args:
             mass: of each robot against the scene's, `(robots,)`.
             friction: of all but its shell, likewise.
+            lag: of its drive's time constants, likewise.
             which: numbers of the robots, `(robots,)`; None for the first of all.
         """
         ...

@@ -67,10 +67,15 @@ class WatchedRobot:
         return self.scene.poses(self.data.qpos[None])
 
     def embody(
-        self, mass: np.ndarray, friction: np.ndarray, which: np.ndarray | None = None
+        self,
+        mass: np.ndarray,
+        friction: np.ndarray,
+        lag: np.ndarray,
+        which: np.ndarray | None = None,
     ) -> None:
         """See `Simulator.embody`."""
-        fields = body_fields(self.scene, mass, friction) | wheel_limits(self.scene, 1)
+        fields = body_fields(self.scene, mass, friction, lag)
+        fields |= wheel_limits(self.scene, 1)
         for name, (where, values) in fields.items():
             getattr(self.model, name)[where] = values[0]
         mujoco.mj_setConst(self.model, self.data)
@@ -79,7 +84,7 @@ class WatchedRobot:
     def disembody(self) -> None:
         """See `Simulator.disembody`."""
         if self._embodied:
-            self.embody(np.ones(1), np.ones(1))
+            self.embody(np.ones(1), np.ones(1), np.ones(1))
             self._embodied = False
 
     def clearances(self) -> np.ndarray:

@@ -1,6 +1,7 @@
-"""Calibration: the sensor gains, wheel radii and track of one robot.
+"""Calibration: the sensor gains, wheels and delays of one robot.
 
-Made by `python -m epuck_mj.calibrate`, read by simulation and bridge alike.
+Made by `python -m epuck_mj.calibrate`, measured or fitted to a log; read by simulation
+and bridge alike.
 """
 
 from dataclasses import dataclass, fields
@@ -18,17 +19,21 @@ from epuck_mj.host.yaml_and_json import read_yaml, to_yaml
 
 @dataclass(frozen=True)
 class Calibration:
-    """Sensor gains, wheel radii and track of one robot.
+    """Sensor gains, wheel radii, track and delays of one robot.
 
     Attributes:
         proximity_gains: counts of each sensor against the mean sensor's.
         wheel_radii: on which the robot rolls, left and right [m].
         track: effective distance of the wheels [m].
+        latency: control steps until a command has reached the wheels.
+        lag: time constants of the drive against the nominal robot's.
     """
 
     proximity_gains: tuple[float, ...] = (1.0,) * N_PROXIMITY
     wheel_radii: tuple[float, ...] = (WHEEL_RADIUS,) * N_WHEELS
     track: float = TRACK
+    latency: int = 0
+    lag: float = 1.0
 
     def __post_init__(self) -> None:
         """Refuse values that no robot has."""
@@ -41,6 +46,8 @@ class Calibration:
         for radius in self.wheel_radii:
             check("length", radius, "wheel_radii")
         check("length", self.track, "track")
+        check("latency", self.latency)
+        check("lag", self.lag)
 
     @property
     def gains(self) -> np.ndarray:
@@ -63,6 +70,8 @@ class Calibration:
             "proximity_gains": [float(gain) for gain in self.proximity_gains],
             "wheel_radii": [float(radius) for radius in self.wheel_radii],
             "track": float(self.track),
+            "latency": int(self.latency),
+            "lag": float(self.lag),
         }
         with writing():
             write_text(path, to_yaml(content))

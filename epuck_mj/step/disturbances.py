@@ -102,6 +102,7 @@ class Disturbances:
         latency: control steps until a command has reached the wheels, `(k,)`, int.
         mass: of the robot against its own, `(k,)`.
         friction: of its wheels against their own, `(k,)`.
+        lag: of its drive's time constants against their own, `(k,)`.
     """
 
     of: np.ndarray
@@ -115,6 +116,7 @@ class Disturbances:
     latency: np.ndarray
     mass: np.ndarray
     friction: np.ndarray
+    lag: np.ndarray
 
     def __post_init__(self) -> None:
         """Refuse arrays that do not belong together."""
@@ -130,6 +132,7 @@ class Disturbances:
             "latency": (k,),
             "mass": (k,),
             "friction": (k,),
+            "lag": (k,),
         }
         for name, shape in expected.items():
             if (got := getattr(self, name).shape) != shape:
@@ -197,6 +200,7 @@ def draw_disturbances(
         latency=rng.integers(ranges.latency[0], ranges.latency[1] + 1, n),
         mass=rng.uniform(*ranges.mass, n),
         friction=rng.uniform(*ranges.friction, n),
+        lag=np.ones(n),
     )
 
 
@@ -226,4 +230,6 @@ def draw_calibrated(
         known_gains=gains,
         wheel_gains=np.tile(wheels, (n, 1)),
         turn_gain=np.full(n, TRACK / calibration.track),
+        latency=np.full(n, calibration.latency),
+        lag=np.full(n, calibration.lag),
     )

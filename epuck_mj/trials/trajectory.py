@@ -38,6 +38,8 @@ class Trajectory:
         action: what the policy decided, `(T, 2)`: v in [0, 1], w in [-1, 1].
         command: wheel speeds sent, left and right [rad/s], `(T, 2)`.
         fitness: step fitness, `(T,)`.
+        motor_steps: that the motors have made since the start, left and right, by the
+            counters of a real robot, `(T + 1, 2)`; None of a simulated one.
     """
 
     time: np.ndarray
@@ -50,6 +52,7 @@ class Trajectory:
     action: np.ndarray
     command: np.ndarray
     fitness: np.ndarray
+    motor_steps: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         """Refuse arrays that do not belong together."""
@@ -66,6 +69,8 @@ class Trajectory:
             "command": (float, (steps, 2)),
             "fitness": (float, (steps,)),
         }
+        if self.motor_steps is not None:
+            expected["motor_steps"] = (float, (steps + 1, 2))
         for name, (dtype, shape) in expected.items():
             got = getattr(self, name)
             if got.dtype != dtype or got.shape != shape:
@@ -73,6 +78,12 @@ class Trajectory:
                     f"expected {name} of type {np.dtype(dtype)} and shape {shape}, "
                     f"got {got.dtype} {got.shape}"
                 )
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Its arrays by name, without those that it has not."""
+        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: array for name, array in arrays.items() if array is not None}
 
     @property
     def steps(self) -> int:
@@ -100,9 +111,8 @@ class Trajectory:
         Raises:
             UserError: if it cannot be written.
         """
-        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
         with writing():
-            write_arrays(Path(path), {"format": np.array(FORMAT), **arrays})
+            write_arrays(Path(path), {"format": np.array(FORMAT), **self.arrays})
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

@@ -127,4 +127,5 @@ def met(world: World, index: int, n: int, steps: int) -> Disturbances:
         latency=same(world.latency),
         mass=same(world.mass),
         friction=same(world.friction),
+        lag=np.ones(n),
     )

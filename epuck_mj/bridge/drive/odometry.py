@@ -21,6 +21,7 @@ class Odometry:
     Attributes:
         pose: `(3,)`: x, y [m], yaw [rad].
         length: of the path of the axle's middle [m].
+        steps: that both motors have made since the first call, not wrapped, `(2,)`.
     """
 
     def __init__(self, calibration: Calibration, start: np.ndarray) -> None:
@@ -36,6 +37,7 @@ class Odometry:
         self._asked = 0.0
         self.pose = np.array(start, float)
         self.length = 0.0
+        self.steps = np.zeros(2)
 
     def update(self, counters: Steps, asked: float, now: float) -> None:
         """Move by the counters' change; the first call only sets their start.
@@ -61,6 +63,7 @@ class Odometry:
                 f"at most {possible:.0f} steps in {elapsed:.3f} s",
                 f"{steps[0]} and {steps[1]}: the robot was reset",
             )
+        self.steps = self.steps + steps
         left, right = steps * self._step_lengths
         distance, turn = (left + right) / 2, (right - left) / self._track
         # the chord of the arc, in the direction half-way round

@@ -34,6 +34,7 @@ class Moment:
         time: when it came, since the robot started [s].
         proximity: counts ps0..ps7, `(8,)`.
         pose: by odometry, `(3,)`: x, y [m], yaw [rad].
+        steps: that both motors have made since the start, `(2,)`.
         rates: that it was told to drive at [steps/s], left and right, `(2,)`.
         latency: from asking for the reading to having it [s].
     """
@@ -41,6 +42,7 @@ class Moment:
     time: float
     proximity: np.ndarray
     pose: np.ndarray
+    steps: np.ndarray
     rates: np.ndarray
     latency: float
 
@@ -196,6 +198,7 @@ class RealRobot:
             time=now - self._origin,
             proximity=counts,
             pose=self.odometry.pose,
+            steps=self.odometry.steps,
             rates=np.array(self._rates),
             latency=now - asked,
         )

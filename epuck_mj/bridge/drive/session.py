@@ -105,6 +105,7 @@ class Session:
             action=_rows([control.action for control in controls]),
             command=_rows([step.moment.rates * STEP_ANGLE for step in self.steps]),
             fitness=np.array([control.fitness for control in controls], float),
+            motor_steps=np.array([moment.steps for moment in moments], float),
         )
 
 

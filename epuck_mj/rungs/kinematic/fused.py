@@ -480,12 +480,13 @@ class FusedTrials:
         n, time = len(starts), self._task.control_step
         noise, of = _noise(disturbances, n, time)
         reach = self._task.sensor_range
-        mass = np.ones(n)
+        mass, slow = np.ones((2, n))
         if disturbances is not None:
-            reach, mass = max(reach, PROXIMITY_REACH), disturbances.mass[of]
+            reach = max(reach, PROXIMITY_REACH)
+            mass, slow = disturbances.mass[of], disturbances.lag[of]
         plan = self._plan(reach)
         task = self._compiled_task(reach)
-        states, lag = at_rest(starts), lags(plan, mass, time)
+        states, lag = at_rest(starts), lags(plan, mass, slow, time)
         fitness, steps = np.zeros(n), np.zeros(n, np.int64)
         crashed = np.zeros(n, bool)
 

@@ -44,7 +44,7 @@ class KinematicRobots:
         self._threads = threads
         self._time = scene.n_substeps * scene.model.opt.timestep
         self._plan = plan_of(scene, ENDLESS, self._time)
-        self._mass = np.ones(capacity)
+        self._mass, self._lag = np.ones((2, capacity))
         self._spare = 1.0
         self._states = np.zeros((0, N_STATE))
         self._lags = np.zeros((0, 4))
@@ -60,8 +60,9 @@ class KinematicRobots:
                 f"expected at most {self.capacity} starts, got {len(starts)}"
             )
         self._states = at_rest(starts)
-        self._lags = lags(self._plan, self._mass[: len(starts)], self._time)
-        distance, contact = _empty(len(starts))
+        n = len(starts)
+        self._lags = lags(self._plan, self._mass[:n], self._lag[:n], self._time)
+        distance, contact = _empty(n)
         touch_all(self._plan, self._states, contact)
         sense_all(self._plan, self._states, ENDLESS, distance)
         return Reading(distance, contact)
@@ -92,7 +93,8 @@ class KinematicRobots:
         """See `Robots.restart`."""
         states = at_rest(starts)
         self._states[which] = states
-        self._lags[which] = lags(self._plan, self._mass[which], self._time)
+        mass, lag = self._mass[which], self._lag[which]
+        self._lags[which] = lags(self._plan, mass, lag, self._time)
         distance, contact = _empty(len(states))
         touch_all(self._plan, states, contact)
         sense_all(self._plan, states, ENDLESS, distance)
@@ -113,15 +115,21 @@ class KinematicRobots:
         return self._probe.measure(self.poses()).distance
 
     def embody(
-        self, mass: np.ndarray, friction: np.ndarray, which: np.ndarray | None = None
+        self,
+        mass: np.ndarray,
+        friction: np.ndarray,
+        lag: np.ndarray,
+        which: np.ndarray | None = None,
     ) -> None:
         """See `Simulator.embody`; wheels that roll have no friction to lose."""
-        self._mass[slice(len(mass)) if which is None else which] = mass
+        ids = slice(len(mass)) if which is None else which
+        self._mass[ids], self._lag[ids] = mass, lag
         self._spare = SPARE_SPEED
 
     def disembody(self) -> None:
         """See `Simulator.disembody`."""
         self._mass, self._spare = np.ones(self.capacity), 1.0
+        self._lag = np.ones(self.capacity)
 
     @cached_property
     def _probe(self) -> ClearanceProbe:
@@ -148,15 +156,19 @@ def substeps(control_step: float) -> tuple[int, float]:
     return n, control_step / n
 
 
-def lags(plan: Plan, mass: np.ndarray, control_step: float) -> np.ndarray:
-    """What `kernel.move` needs to know of the lags of robots with masses `(n,)`.
+def lags(
+    plan: Plan, mass: np.ndarray, lag: np.ndarray, control_step: float
+) -> np.ndarray:
+    """What `kernel.move` needs to know of the lags of robots, `(n, 4)`.
 
     Args:
-        plan: of a robot whose mass is 1.
-        mass: against that robot's.
+        plan: of a robot whose mass and lag are 1.
+        mass: against that robot's, `(n,)`.
+        lag: of the time constants, likewise.
         control_step: its duration [s].
     """
     _, substep = substeps(control_step)
-    lag = plan.massless + mass[:, None] * (plan.lag - plan.massless)
-    left = exp(-substep / lag)
-    return np.stack([left, (1.0 - left) * lag], axis=-1).reshape(-1, 4)
+    own = plan.massless + mass[:, None] * (plan.lag - plan.massless)
+    own = lag[:, None] * own
+    left = exp(-substep / own)
+    return np.stack([left, (1.0 - left) * own], axis=-1).reshape(-1, 4)

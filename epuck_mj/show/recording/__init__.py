@@ -11,7 +11,7 @@ and `signals/*`; `summary`. Timelines: `sim_time` since the start, and `step`.
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import rerun as rr
@@ -92,6 +92,6 @@ def _identity(trials: Sequence[Trial]) -> str:
     digest = hashlib.sha256()
     for trial in trials:
         digest.update(trial.name.encode())
-        for field in fields(trial.trajectory):
-            digest.update(getattr(trial.trajectory, field.name).tobytes())
+        for array in trial.trajectory.arrays.values():
+            digest.update(array.tobytes())
     return digest.hexdigest()[:32]
