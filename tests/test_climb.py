@@ -230,7 +230,8 @@ def test_finalists_are_compared_on_wheels(monkeypatch, finalists):
     evolution = evolved(c)
     seen: list[tuple[str, int]] = []
     cheap, wheels = (
-        Watched(scene, c.task, seen) for scene in (evolution.scene, evolution._wheels)
+        Watched(scene, c.task, seen)
+        for scene in (evolution.scene, evolution._evolved[-1])
     )
     champion = choose_champion(cheap, evolution, stored_by(evolution), wheels)
     everybody = len(candidates(stored_by(evolution))[0])

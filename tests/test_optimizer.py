@@ -18,7 +18,6 @@ from evolution.search.properties import (
     sphere,
 )
 from evolution.search.random_search import RandomSearch, RandomSearchParameters
-from evolution.search.sequence import SequenceParameters
 from evolution.search.table import (
     ALGORITHMS,
     Optimizer,
@@ -40,12 +39,16 @@ VARIANTS = {
     "small de-best then cma-es": replace(
         SEQUENCE, first=replace(BEST, population=20), budget=100
     ),
-    "de-best then de-rand": SequenceParameters(
-        replace(BEST, population=20), replace(RAND, population=20), budget=200
+    "de-best then de-rand": replace(
+        SEQUENCE,
+        first=replace(BEST, population=20),
+        then=replace(RAND, population=20),
+        budget=200,
     ),
-    "cma-es then de-rand": SequenceParameters(
-        replace(CMA, restarts=False, population=20),
-        replace(RAND, population=20, reevaluate_best=3),
+    "cma-es then de-rand": replace(
+        SEQUENCE,
+        first=replace(CMA, restarts=False, population=20),
+        then=replace(RAND, population=20, reevaluate_best=3),
         share=0.5,
         budget=200,
     ),

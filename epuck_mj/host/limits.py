@@ -130,11 +130,10 @@ LIMITS: Mapping[str, Limit] = MappingProxyType(
         # calibration files
         "gain": _above_0(100),
         "length": _above_0(1, "m", LENGTHS),
-        "latency": Limit(0, 100),
+        "latency": Limit(0, 1000, "control steps"),
         "lag": _above_0(100),
         # agents
         "num_envs": COUNT,
-        "latency": Limit(0, 1000, "control steps"),
         "pixels": Limit(1, 4096),
         "action": Limit(-1_000_000, 1_000_000, whole=False),
         "random": Limit(0, 2**32 - 1, why="or a numpy.random.RandomState, or None"),
