@@ -22,10 +22,17 @@ REPORTED = ("paper", "wheels")
 TRANSFER = "transfer"
 """Study of evolution with real sensors and motors, which the gap measures."""
 
+HYBRIDS = "hybrids"
+"""Study of evolution that learns, with a page of its own."""
+
+VARIATIONS = ("variations", "steps-150", "steps-500", "climbing")
+"""Studies of variations, of which `evolution.variations` writes a page."""
+
 PAGES: Mapping[str, tuple[str, ...]] = {
     "README.md": ("medians",),
     "docs/findings.md": ("paper", "wheels"),
     "docs/transfer.md": ("gap",),
+    "docs/hybrids.md": ("hybrids",),
 }
 """Pages that show results, and the names of their tables."""
 
@@ -44,7 +51,7 @@ def publish(argv: Sequence[str]) -> int:
     parse(
         PublishOptions, "python -m evolution.reproduce.publish", argv, PublishOptions()
     )
-    for name in (*REPORTED, TRANSFER):
+    for name in (*REPORTED, TRANSFER, HYBRIDS, *VARIATIONS):
         if (Path("runs") / name).is_dir():
             ship(Path("runs") / name, Path("results") / name)
     paper, *others = (str(path) for path in shipped(Path("results")))
@@ -111,7 +118,8 @@ def _tables(results: Path) -> dict[str, str]:
     from evolution.study.data import load_study
 
     tables = {}
-    for path in shipped(results):
+    hybrids = [results / HYBRIDS] if (results / HYBRIDS).is_dir() else []
+    for path in [*shipped(results), *hybrids]:
         study = load_study(path)
         tables[path.name] = to_markdown([runs_table(study)])
         if path.name == REPORTED[0]:
