@@ -64,7 +64,7 @@ gap: $(INSTALLED)
 # what git keeps of the studies in runs/, and everything that is made of it
 results: $(INSTALLED)
 	$(BIN)/python -m evolution.reproduce.publish
-	$(BIN)/python -m evolution.report results/hybrids --output results/report-hybrids
+	$(BIN)/python -m evolution.hybrids results/hybrids --output results/report-hybrids
 	$(BIN)/python -m evolution.variations results/variations \
 	  --output results/report-variations
 

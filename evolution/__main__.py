@@ -16,6 +16,7 @@ COMMANDS = {
     "evolution.study": "do many runs: every experiment with every seed",
     "evolution.report": "write tables and figures of a study",
     "evolution.margins": "test champions on robots that differ in one number",
+    "evolution.hybrids": "write a page about evolution that learns",
     "evolution.variations": "write a page about variations of the algorithms",
     "evolution.gap": "test champions in a hundred other worlds",
     "evolution.export": "write the controller file of a run in a study's tables",

@@ -36,7 +36,7 @@ ROOMS = {
         {"margins", "named_policies", "pages"},
         {"evaluate", "export", "frames", "gap", "replay", "report", "verify"},
         {"reproduce"},
-        {"variations"},
+        {"hybrids", "variations"},
         {"__main__"},
     ],
 }
@@ -76,6 +76,7 @@ ALLOWED_IN = {
         "epuck_mj/check/picture.py",
         "epuck_mj/show/",
         "evolution/gap/figure.py",
+        "evolution/hybrids/hybrids_figures.py",
         "evolution/pages/figure_files.py",
         "evolution/pages/style.py",
         "evolution/report/figures/",

@@ -1,0 +1,1 @@
+"""Evolution that learns, held against DE/best and against its controls."""
