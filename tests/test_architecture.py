@@ -35,8 +35,9 @@ ROOMS = {
         {"study"},
         {"margins", "named_policies", "pages"},
         {"evaluate", "export", "frames", "gap", "replay", "report", "verify"},
+        {"hybrids"},
         {"reproduce"},
-        {"hybrids", "variations"},
+        {"variations"},
         {"__main__"},
     ],
 }

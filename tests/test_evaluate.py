@@ -192,6 +192,8 @@ def test_a_robot_that_was_measured(tmp_path):
         "proximity_gains": list(calibration.proximity_gains),
         "wheel_radii": list(calibration.wheel_radii),
         "track": calibration.track,
+        "latency": 0,
+        "lag": 1.0,
     }
     for wrong, message in {
         ("wall-follower", *own): "calibration needs noise: calibrated or strong, got",

@@ -130,7 +130,7 @@ def test_streams_depend_on_each_part_of_their_key():
     draws = [random_generator(*key).random(4).tolist() for key in keys]
     assert draws[0] == random_generator(1).random(4).tolist()
     assert all(a != b for i, a in enumerate(draws) for b in draws[:i])
-    assert len(set(Purpose)) == len(Purpose.__members__) == 5
+    assert len(set(Purpose)) == len(Purpose.__members__) == 6
 
 
 # records

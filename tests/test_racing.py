@@ -23,7 +23,7 @@ from evolution.run.champion import choose_champion, stored_by
 from evolution.run.generation_loop import Evolution
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
-from tests.shipped import OPTIMIZERS
+from tests.shipped import HYBRIDS, OPTIMIZERS
 
 SCENE = load_scene("epuck", "arena")
 SPACE = FreeSpace(SCENE, 0.01)
@@ -31,7 +31,10 @@ NETWORK = Network()
 TASK = TaskParameters(steps=60)
 
 ELITIST = "one-plus-one-es-as-first-shipped"
-RACES = ("de-best", "de-rand", "random-search", "l-shade", "ssshc", ELITIST)
+RACES = (
+    *("de-best", "de-rand", "random-search", "l-shade", "ssshc", ELITIST),
+    *("de-best-then-cma-es", "memetic-de", "lifetime-learning"),
+)
 """Optimisers that forget who does not beat somebody."""
 
 
@@ -242,6 +245,10 @@ def small(name: str, **update) -> ExperimentConfig:
     optimizer = config.optimizer
     if "population" in {field.name for field in fields(optimizer)}:
         optimizer = replace(optimizer, **{"population": 10})
+    for part in ("evolution", "first", "then"):
+        if hasattr(optimizer, part):
+            smaller = replace(getattr(optimizer, part), population=10)
+            optimizer = replace(optimizer, **{part: smaller})
     if name == "openai-es":
         optimizer = replace(optimizer, **{"pairs": 4})
     sizes = {"evaluations": 10 * GENERATIONS, "steps": 40, "trials": 3}
@@ -254,6 +261,9 @@ def small(name: str, **update) -> ExperimentConfig:
     # every other generation is of parents, too
     if name == "ssshc":
         sizes |= {"evaluations": 120}
+    # lessons count as well, and refinements are smaller generations
+    if name in HYBRIDS:
+        sizes |= {"evaluations": 150}
     sizes |= {"validation_starts": 20, "optimizer": optimizer}
     return config.model_copy(update=sizes | update)
 

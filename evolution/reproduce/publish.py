@@ -113,13 +113,16 @@ def pages_with_tables(root: Path) -> dict[Path, str]:
 def _tables(results: Path) -> dict[str, str]:
     """Tables of the shipped studies, by name, in Markdown."""
     # slow to import
+    from evolution.hybrids.hybrids_page import worth_table
     from evolution.pages.blocks import to_markdown
     from evolution.reproduce.reproduction import medians_table, runs_table
     from evolution.study.data import load_study
 
     tables = {}
-    hybrids = [results / HYBRIDS] if (results / HYBRIDS).is_dir() else []
-    for path in [*shipped(results), *hybrids]:
+    hybrids = results / HYBRIDS
+    if hybrids.is_dir():
+        tables[HYBRIDS] = to_markdown([worth_table(load_study(hybrids))])
+    for path in shipped(results):
         study = load_study(path)
         tables[path.name] = to_markdown([runs_table(study)])
         if path.name == REPORTED[0]:

@@ -249,4 +249,6 @@ def _earned(evolution: Evolution, genome: np.ndarray, generations: range) -> np.
 
 def _arrays(content: Any) -> Mapping[str, Any]:
     """The arrays of a dataclass as lists."""
-    return {f.name: getattr(content, f.name).tolist() for f in fields(content)}
+    arrays = {f.name: getattr(content, f.name) for f in fields(content)}
+    # a robot's log has one array more than a simulated trial
+    return {k: array.tolist() for k, array in arrays.items() if array is not None}
