@@ -64,9 +64,6 @@ gap: $(INSTALLED)
 # what git keeps of the studies in runs/, and everything that is made of it
 results: $(INSTALLED)
 	$(BIN)/python -m evolution.reproduce.publish
-	$(BIN)/python -m evolution.hybrids results/hybrids --output results/report-hybrids
-	$(BIN)/python -m evolution.variations results/variations \
-	  --output results/report-variations
 
 # all pictures; the first needs EGL or OSMesa, the second a Vulkan driver
 figures: $(INSTALLED) run

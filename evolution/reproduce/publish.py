@@ -13,6 +13,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.command_line import main, parse
 from epuck_mj.scene.model_files import WHEELED_ROBOT
+from evolution.hybrids.__main__ import report_hybrids
 from evolution.reproduce.__main__ import reproduce_paper
 from evolution.study.directory import StudyDirectory
 
@@ -24,9 +25,6 @@ TRANSFER = "transfer"
 
 HYBRIDS = "hybrids"
 """Study of evolution that learns, with a page of its own."""
-
-VARIATIONS = ("variations", "steps-150", "steps-500", "climbing")
-"""Studies of variations, of which `evolution.variations` writes a page."""
 
 PAGES: Mapping[str, tuple[str, ...]] = {
     "README.md": ("medians",),
@@ -51,12 +49,19 @@ def publish(argv: Sequence[str]) -> int:
     parse(
         PublishOptions, "python -m evolution.reproduce.publish", argv, PublishOptions()
     )
-    for name in (*REPORTED, TRANSFER, HYBRIDS, *VARIATIONS):
+    for name in (*REPORTED, TRANSFER, HYBRIDS):
         if (Path("runs") / name).is_dir():
             ship(Path("runs") / name, Path("results") / name)
     paper, *others = (str(path) for path in shipped(Path("results")))
     wheels = [argument for path in others for argument in ("--wheels", path)]
     reproduce_paper(["--study", paper, *wheels, "--output", "results"])
+    hybrids = Path("results") / HYBRIDS
+    if hybrids.is_dir():
+        report_hybrids([str(hybrids), "--output", "results/report-hybrids"])
+    for figure in Path("results").glob("report-*/figures/*"):
+        # the pages show PNG or have the figure in them; git keeps no more
+        if figure.suffix in (".svg", ".pdf"):
+            figure.unlink()
     for page, text in pages_with_tables(Path()).items():
         files.write_text(page, text)
     return 0
