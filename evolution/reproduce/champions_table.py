@@ -1,4 +1,4 @@
-"""The table of docs/champions.md: of each experiment, the champion to drive first."""
+"""The table of docs/champions.md: one champion of each experiment, with its tests."""
 
 from collections.abc import Sequence
 
