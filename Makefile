@@ -3,10 +3,12 @@ PYTHON ?= python3
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 RUN := runs/de-best-seed-1
+# without the notice of mkdocs-material
+MKDOCS := NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs
 CHAMPION := results/paper/de-best/seed-1
 PAPERS := de-best de-rand ga
 
-.PHONY: run test bench ladder convergence racing overhead recording bridge ppo gap results figures clean
+.PHONY: run test docs docs-serve bench ladder convergence racing overhead recording bridge ppo gap results figures clean
 
 run: $(INSTALLED)
 	@if [ -f $(RUN)/config.yaml ]; then \
@@ -21,6 +23,14 @@ test: $(INSTALLED)
 	$(BIN)/ruff check .
 	$(BIN)/pyright
 	$(BIN)/python -m pytest -q -n 3 --dist worksteal --durations=20
+
+# the site, in site/; a warning is an error
+docs: $(INSTALLED)
+	$(MKDOCS) build --strict
+
+# the site on http://127.0.0.1:8000, made anew when a page changes
+docs-serve: $(INSTALLED)
+	$(MKDOCS) serve --livereload
 
 bench: $(INSTALLED)
 	$(BIN)/python -m benchmarks.throughput --json results/throughput.json
@@ -82,4 +92,4 @@ $(INSTALLED): pyproject.toml constraints.txt
 	touch $(INSTALLED)
 
 clean:
-	rm -rf .venv .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv site .pytest_cache .ruff_cache .hypothesis

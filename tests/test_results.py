@@ -15,6 +15,7 @@ from evolution.gap.transfer import Gap, Transfer
 from evolution.judging.held_out import Judges
 from evolution.named_policies import named_policies
 from evolution.pages.blocks import to_markdown
+from evolution.reproduce.champions_table import champions_table
 from evolution.reproduce.publish import PAGES, pages_with_tables, shipped
 from evolution.run.directory import RunDirectory
 from evolution.study.addresses import run_at, runs_at
@@ -101,6 +102,28 @@ def test_the_pages_show_what_is_shipped():
     assert set(pages) == {ROOT / name for name in PAGES}
     for path, text in pages.items():
         assert path.read_text() == text, path.name
+
+
+def test_the_card_s_champions_were_chosen_by_validation():
+    table = champions_table(
+        [load_study(RESULTS / "paper"), load_study(RESULTS / "wheels")]
+    )
+    assert len(table.rows) > 10
+    for address, _, n, validation, wheels, *_ in table.rows:
+        runs = runs_at(RESULTS / address)
+        (chosen,) = (run for run in runs if not isinstance(run, RunDirectory))
+        scores = chosen.champion.scores
+        assert validation == f"{scores['validation']:.0f}"
+        assert wheels == f"{scores['held_out']['epuck']['mean']:.0f}"
+        others = runs_at((RESULTS / address).parent.parent)
+        all_of_them = [
+            run.champion.scores["validation"]
+            for run in others
+            if not isinstance(run, RunDirectory)
+            and run.path.parent.name == chosen.path.parent.name
+        ]
+        assert len(all_of_them) == int(n)
+        assert scores["validation"] == max(all_of_them)
 
 
 def test_a_page_without_its_markers_is_refused(tmp_path):

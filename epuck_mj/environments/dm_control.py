@@ -41,6 +41,7 @@ from epuck_mj.step.sensors import Reading, observe
 PhysicsError = control.PhysicsError
 
 SUITE = containers.TaggedTasks()
+"""Tasks of dm_control by name: `follow_walls`."""
 
 
 def load(

@@ -28,6 +28,7 @@ HYBRIDS = "hybrids"
 
 PAGES: Mapping[str, tuple[str, ...]] = {
     "README.md": ("medians",),
+    "docs/champions.md": ("champions",),
     "docs/findings.md": ("paper", "wheels"),
     "docs/transfer.md": ("gap",),
     "docs/hybrids.md": ("hybrids",),
@@ -120,18 +121,22 @@ def _tables(results: Path) -> dict[str, str]:
     # slow to import
     from evolution.hybrids.hybrids_page import worth_table
     from evolution.pages.blocks import to_markdown
+    from evolution.reproduce.champions_table import champions_table
     from evolution.reproduce.reproduction import medians_table, runs_table
     from evolution.study.data import load_study
 
-    tables = {}
-    hybrids = results / HYBRIDS
-    if hybrids.is_dir():
-        tables[HYBRIDS] = to_markdown([worth_table(load_study(hybrids))])
-    for path in shipped(results):
-        study = load_study(path)
-        tables[path.name] = to_markdown([runs_table(study)])
-        if path.name == REPORTED[0]:
+    tables, studies = {}, [load_study(path) for path in shipped(results)]
+    for study in studies:
+        name = study.path.name
+        tables[name] = to_markdown([runs_table(study)])
+        if name == REPORTED[0]:
             tables["medians"] = to_markdown([medians_table(study, WHEELED_ROBOT)])
+    for path in (results / TRANSFER, results / HYBRIDS):
+        if path.is_dir():
+            studies.append(load_study(path))
+            if path.name == HYBRIDS:
+                tables[HYBRIDS] = to_markdown([worth_table(studies[-1])])
+    tables["champions"] = to_markdown([champions_table(studies)])
     gap = results / "gap" / "summary.md"
     if gap.exists():
         tables["gap"] = gap.read_text(encoding="utf-8")

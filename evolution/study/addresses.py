@@ -46,13 +46,16 @@ def runs_at(place: Path, histories: bool = False) -> list[PlacedRun]:
     return [found[run] for run in [(name, int(number))] if run in found]
 
 
-def champion_at(place: Path) -> ControllerFile:
+def champion_at(place: str | Path) -> ControllerFile:
     """The champion of the one run at an address.
+
+    Args:
+        place: `STUDY/EXPERIMENT/seed-N`, or the directory of a run.
 
     Raises:
         UserError: if there is no run, or more than one, or it has no champion.
     """
-    run = run_at(place)
+    run = run_at(Path(place))
     return load_controller(run.path) if isinstance(run, RunDirectory) else run.champion
 
 
