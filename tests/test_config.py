@@ -119,7 +119,7 @@ ON_REAL_ROBOTS = {
     "ga-randomised": ("ga", RANDOMISED),
 }
 """The paper's again, under disturbances."""
-ALL = sorted([*SHIPPED, *ON_REAL_ROBOTS, *HYBRIDS, "policy-gradient"])
+ALL = sorted([*SHIPPED, *ON_REAL_ROBOTS, *HYBRIDS, "policy-gradient", "best"])
 
 every_experiment = pytest.mark.parametrize("name", SHIPPED)
 COMMON = {
@@ -469,7 +469,7 @@ def test_a_part_of_an_optimizer_is_checked(evolution, expected):
     assert expected in str(refused.value)
 
 
-@pytest.mark.parametrize("name", [*HYBRIDS, "policy-gradient"])
+@pytest.mark.parametrize("name", [*HYBRIDS, "policy-gradient", "best"])
 def test_hybrids_come_back_from_their_yaml(name):
     config = load_config(find_config(name))
     assert ExperimentConfig.from_yaml(config.to_yaml(), "mine") == config

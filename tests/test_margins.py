@@ -20,7 +20,10 @@ from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.robot_parts import SHELL
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import TaskParameters, run_trials
-from evolution.judging.evaluation import BatchEngine, Work
+from evolution.judging.evaluation import BatchEngine, Work, evaluate
+from evolution.judging.held_out import Judges
+from evolution.judging.held_out_starts import starts_for_validation
+from evolution.judging.scores import read_champion
 from evolution.margins.__main__ import measure_margins
 from evolution.margins.changes import CHANGES
 from evolution.margins.margins_table import (
@@ -32,7 +35,10 @@ from evolution.margins.margins_table import (
 )
 from evolution.margins.measuring import Margin, margins_of_genomes, margins_of_policy
 from evolution.report.figures.margins import margins_figure
+from evolution.run.directory import RunDirectory
+from evolution.run.execution import Run
 from evolution.run.generation_loop import Evolution
+from evolution.run.means import Means
 from evolution.settings.config_files import find_config, load_config
 from evolution.settings.setting import Setting
 
@@ -74,13 +80,42 @@ def test_champions_keep_off_walls_by_the_margin_of_their_bodies():
         update={"body_margin": 0.002, "climb": 0.5, "evaluations": 900, "steps": 20}
     )
     evolution = Evolution(config, threads=1)
-    # what is chosen and tested is the robot itself
+    # what is tested is the robot itself
     assert evolution.scene.model.geom(SHELL).size[0] == BODY_RADIUS
     list(evolution.run())
     assert evolution.climbed
     again = Evolution(config.model_copy(update={"body_margin": 0.0}), threads=1)
     list(again.run())
     assert again.history() != evolution.history()
+
+
+def test_a_champion_is_chosen_with_the_margin_and_tested_without(tmp_path):
+    config = load_config(find_config("de-best")).model_copy(
+        update={
+            "body_margin": 0.005,
+            "climb": 1.0,
+            "finalists": 0,
+            "evaluations": 900,
+            "steps": 100,
+            "validation_starts": 20,
+            "test_starts": 30,
+        }
+    )
+    run = Run(config, RunDirectory(tmp_path / "run"), Means(threads=1), [])
+    run.start()
+    for _ in run.evolve():
+        pass
+    scores = run.finish()
+    judge = Judges(1).of("epuck_kinematic", config.setting)
+    champion, _ = read_champion(tmp_path / "run" / "champion.json")
+    test = judge.test(champion.controller, 30)
+    assert scores.held_out["epuck_kinematic"].mean == test.mean
+    wider = with_body_margin(judge.scene, 0.005)
+    starts = starts_for_validation(FreeSpace(judge.scene, 0.01), 1000)
+    engine = BatchEngine(wider, config.task, 1)
+    genome = champion.genome[None]
+    again = evaluate(engine, config.topology, genome, starts).fitness[0]
+    assert scores.validation == pytest.approx(again, abs=1e-9)
 
 
 def test_sensors_are_set_back_along_their_rays(square):

@@ -8,6 +8,7 @@ import numpy as np
 
 from epuck_mj.host import files
 from epuck_mj.policies.file import ControllerFile, Origin
+from epuck_mj.scene.changed_robots import with_body_margin
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.step.control import BatchPolicy
@@ -134,9 +135,13 @@ def _chosen(
 ) -> Champion:
     """The champion; its engines, of hundreds of megabytes, end with the choice."""
     config, wheels = evolution.config, None
-    engine = BatchEngine(evolution.scene, config.task, threads)
+    # chosen as evolved: a champion that needs the last bit of room is not wanted
+    margin = config.body_margin
+    scene = with_body_margin(evolution.scene, margin)
+    engine = BatchEngine(scene, config.task, threads)
     if config.has_finalists:
-        wheels = BatchEngine(on_wheels, config.task, threads)
+        scene = with_body_margin(on_wheels, margin)
+        wheels = BatchEngine(scene, config.task, threads)
     return choose_champion(engine, evolution, stored, wheels)
 
 

@@ -120,7 +120,7 @@ class ExperimentConfig(BaseModel):
     body_margin: Annotated[float, within("body_margin")] = Field(
         0.0,
         description="evolve robots whose body is so much wider on every side, so that "
-        "champions keep off walls [m]; they are chosen and tested without it",
+        "champions keep off walls [m]; they are chosen with it and tested without",
     )
     network: NetworkName = Field(
         FEEDFORWARD,
