@@ -76,6 +76,14 @@ def test_a_study_is_the_shipped_config(path: Path):
     assert StudyConfig.from_yaml(path / "study.yaml").experiments == now.experiments
 
 
+@pytest.mark.parametrize("name", ["hybrids", "good-robot"])
+def test_further_studies_are_shipped_configs(name: str):
+    study = load_study(RESULTS / name)
+    now = StudyConfig.load(find_study(name)).experiments
+    assert study.configs == {each: now[each] for each in study.configs}
+    assert not [line for line in study.missing if "not finished" in line]
+
+
 def test_the_main_experiment_finds_wall_followers():
     study = load_study(RESULTS / "paper")
     # one run in some dozens stays far behind

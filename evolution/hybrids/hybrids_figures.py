@@ -5,7 +5,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from epuck_mj.scene.model_files import WHEELED_ROBOT
-from evolution.hybrids.compared import BASE, crash_rates, sweep, trials_to_useful
+from evolution.hybrids.compared import (
+    BASE,
+    crash_rates,
+    median_with_never,
+    sweep,
+    trials_to_useful,
+)
 from evolution.pages.style import COLUMN, PAGE, PRINT, looks
 from evolution.pages.words import label
 from evolution.study.data import StudyData
@@ -30,12 +36,11 @@ def worth_figure(data: StudyData) -> Figure:
     style = looks([BASE])[BASE]
     for axes, (title, values) in zip(panels, measured.items(), strict=True):
         for row, name in enumerate(names):
-            each = np.sort(values(name))
-            known = each[np.isfinite(each)]
+            each = values(name)
+            known, middle = each[np.isfinite(each)], median_with_never(each)
             color = style.color if name == BASE else "0.35"
             axes.plot(known, np.full(known.size, row), ".", color=color, ms=3)
-            if known.size > len(each) // 2:
-                middle = each[(len(each) - 1) // 2]
+            if np.isfinite(middle):
                 axes.plot(middle, row, "|", color="black", ms=8, mew=1.5)
         axes.set(xlabel=title)
         axes.grid(axis="x", color="0.9")

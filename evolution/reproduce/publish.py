@@ -23,15 +23,15 @@ REPORTED = ("paper", "wheels")
 TRANSFER = "transfer"
 """Study of evolution with real sensors and motors, which the gap measures."""
 
-HYBRIDS = "hybrids"
-"""Study of evolution that learns, with a page of its own."""
+HYBRIDS, GOOD_ROBOT = "hybrids", "good-robot"
+"""Studies of evolution that learns, and of what it taught, with a page of their own."""
 
 PAGES: Mapping[str, tuple[str, ...]] = {
     "README.md": ("medians",),
     "docs/champions.md": ("champions",),
     "docs/findings.md": ("paper", "wheels"),
     "docs/transfer.md": ("gap",),
-    "docs/hybrids.md": ("hybrids",),
+    "docs/hybrids.md": (HYBRIDS, GOOD_ROBOT),
 }
 """Pages that show results, and the names of their tables."""
 
@@ -50,7 +50,7 @@ def publish(argv: Sequence[str]) -> int:
     parse(
         PublishOptions, "python -m evolution.reproduce.publish", argv, PublishOptions()
     )
-    for name in (*REPORTED, TRANSFER, HYBRIDS):
+    for name in (*REPORTED, TRANSFER, HYBRIDS, GOOD_ROBOT):
         if (Path("runs") / name).is_dir():
             ship(Path("runs") / name, Path("results") / name)
     paper, *others = (str(path) for path in shipped(Path("results")))
@@ -59,10 +59,10 @@ def publish(argv: Sequence[str]) -> int:
     hybrids = Path("results") / HYBRIDS
     if hybrids.is_dir():
         report_hybrids([str(hybrids), "--output", "results/report-hybrids"])
-    for figure in Path("results").glob("report-*/figures/*"):
-        # the pages show PNG or have the figure in them; git keeps no more
-        if figure.suffix in (".svg", ".pdf"):
-            figure.unlink()
+    # git keeps the pages that it shows, with their pictures
+    for file in Path("results").glob("report-*/**/*"):
+        if file.suffix in (".svg", ".pdf", ".html"):
+            file.unlink()
     for page, text in pages_with_tables(Path()).items():
         files.write_text(page, text)
     return 0
@@ -131,11 +131,11 @@ def _tables(results: Path) -> dict[str, str]:
         tables[name] = to_markdown([runs_table(study)])
         if name == REPORTED[0]:
             tables["medians"] = to_markdown([medians_table(study, WHEELED_ROBOT)])
-    for path in (results / TRANSFER, results / HYBRIDS):
+    for path in (results / TRANSFER, results / HYBRIDS, results / GOOD_ROBOT):
         if path.is_dir():
             studies.append(load_study(path))
-            if path.name == HYBRIDS:
-                tables[HYBRIDS] = to_markdown([worth_table(studies[-1])])
+            if path.name != TRANSFER:
+                tables[path.name] = to_markdown([worth_table(studies[-1])])
     tables["champions"] = to_markdown([champions_table(studies)])
     gap = results / "gap" / "summary.md"
     if gap.exists():
