@@ -10,7 +10,10 @@ import tyro
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse, word
 
-EXAMPLES = ("python -m evolution.hybrids runs/hybrids --output report-hybrids",)
+EXAMPLES = (
+    "python -m evolution.hybrids runs/hybrids --output report-hybrids",
+    "python -m evolution.hybrids results/hybrids --output report-hybrids",
+)
 
 CAPTIONS = {
     "worth": "Every run (dots) and medians. Dotted: the median of DE/best.",
