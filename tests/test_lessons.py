@@ -20,7 +20,7 @@ from evolution.judging.lessons import Circumstances, GivenLessons, LessonRobots
 from evolution.run.generation_loop import Evolution
 from evolution.search.ask_tell import AskTellError, Optimizer
 from evolution.search.imitators import Imitators, ImitatorsParameters
-from evolution.search.learning_rules import COST, LEARNING_RULES, Rule
+from evolution.search.learning_rules import COST, LEARNING_RULES, Given, Rule
 from evolution.search.lessons import Lessons
 from evolution.search.policy_gradient import PolicyGradient, PolicyGradientParameters
 from evolution.search.search_space import SearchSpace
@@ -107,7 +107,7 @@ def test_a_rule_costs_what_it_says_and_moves_at_most_a_step(kinematic, name):
     lessons, before = given(kinematic), genomes(5)
     rng, rule = np.random.default_rng(0), Rule(0.5, 0.3, 0.95)
     learn = LEARNING_RULES[name]
-    after = learn(before, genomes(1, 7)[0], lessons, rule, SPACE, rng)
+    after = learn(before, Given(genomes(1, 7)[0], lessons, rule, SPACE, rng))
     assert lessons.cost == COST * 5
     assert after.min() >= -5 and after.max() <= 5
     moved = np.linalg.norm(after - before, axis=1)
@@ -129,7 +129,8 @@ def test_learning_improves_controllers(kinematic, name):
     after, lessons = before, given(kinematic, trials=5, task=task)
     for _ in range(15):
         rule = Rule(0.3, 1.0, 0.9)
-        after = LEARNING_RULES[name](after, best, lessons, rule, SPACE, rng)
+        given_now = Given(best, lessons, rule, SPACE, rng)
+        after = LEARNING_RULES[name](after, given_now)
     assert fitness(after) > 1.3 * fitness(before)
 
 

@@ -14,7 +14,6 @@ from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import START_CLEARANCE, TaskParameters
 from epuck_mj.step.disturbances import NOISE
 from epuck_mj.step.fitness import step_fitness
-from epuck_mj.step.motors import Speeds
 
 
 @dataclass(frozen=True)
@@ -103,13 +102,7 @@ class Options:
     @property
     def task(self) -> TaskParameters:
         """Length, fitness, sensors and speeds of a trial."""
-        return TaskParameters(
-            steps=self.steps,
-            control_step=self.control_step,
-            fitness=self.fitness,
-            sensor_range=self.sensor_range,
-            speeds=Speeds(self.v_max, self.w_max),
-        )
+        return TaskParameters.of(self)
 
     @property
     def conditions(self) -> Conditions:

@@ -96,6 +96,24 @@ class TaskParameters:
             raise ValueError(f"unknown fitness {shown(fitness)}")
 
     @classmethod
+    def of(cls, keys: Any) -> Self:
+        """The task that a configuration describes.
+
+        Args:
+            keys: what has them as attributes, as evolution's configuration.
+
+        Raises:
+            ValueError: as the class.
+        """
+        return cls(
+            steps=keys.steps,
+            control_step=keys.control_step,
+            fitness=keys.fitness,
+            sensor_range=keys.sensor_range,
+            speeds=Speeds(keys.v_max, keys.w_max),
+        )
+
+    @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Self:
         """Read what `dataclasses.asdict` gave, as stored with a controller.
 

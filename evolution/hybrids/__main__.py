@@ -40,18 +40,11 @@ def report_hybrids(argv: Sequence[str]) -> int:
         HybridsOptions, "python -m evolution.hybrids", argv, examples=EXAMPLES
     )
     # slow to import
-    from epuck_mj.host import files
     from evolution.hybrids.compared import BASE
     from evolution.hybrids.hybrids_figures import sweep_figure, worth_figure
     from evolution.hybrids.hybrids_page import hybrids_page
-    from evolution.pages.blocks import (
-        FIGURES_FOLDER,
-        Picture,
-        to_html,
-        to_markdown,
-        with_contents,
-    )
-    from evolution.pages.figure_files import write_figure
+    from evolution.pages.blocks import with_contents
+    from evolution.pages.figure_files import write_page, write_pictures
     from evolution.study.data import load_study
 
     data = load_study(options.study)
@@ -60,20 +53,11 @@ def report_hybrids(argv: Sequence[str]) -> int:
             f"expected runs of '{BASE}' to hold others against, got "
             + ", ".join(data.with_runs)
         )
-    folder = options.output / FIGURES_FOLDER
-    with files.writing():
-        folder.mkdir(parents=True, exist_ok=True)
-    pictures = []
-    for name, figure in (("worth", worth_figure(data)), ("sweep", sweep_figure(data))):
-        write_figure(figure, folder, name)
-        svg = (folder / f"{name}.svg").read_bytes()
-        pictures.append(Picture(name, CAPTIONS[name], svg))
+    figures = {"worth": worth_figure(data), "sweep": sweep_figure(data)}
+    pictures = write_pictures(options.output, figures, CAPTIONS)
     blocks = with_contents(hybrids_page(data, pictures))
-    with files.writing():
-        files.write_text(options.output / "hybrids.md", to_markdown(blocks))
-        page = to_html("Evolution that learns", blocks)
-        files.write_text(options.output / "hybrids.html", page)
-    print(f"Hybrids: {options.output / 'hybrids.md'}")
+    path = write_page(options.output, "hybrids", "Evolution that learns", blocks)
+    print(f"Hybrids: {path}")
     return 0
 
 

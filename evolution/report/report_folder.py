@@ -6,8 +6,9 @@ from pathlib import Path
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.policies.wall_follower import YARDSTICK
-from evolution.pages.blocks import FIGURES_FOLDER, Picture, to_html, to_markdown
+from evolution.pages.blocks import FIGURES_FOLDER, Picture
 from evolution.pages.csv_text import csv_text
+from evolution.pages.figure_files import write_page
 from evolution.report.ioh import export_histories
 from evolution.report.page import report_blocks
 from evolution.report.run_table import described_columns, run_rows
@@ -42,9 +43,7 @@ def write_report(study: Path, output: Path, ioh: bool = False) -> tuple[str, ...
         found = summary_fields(data, output.as_posix(), ioh)
         files.write_text(output / "summary.json", summary_text(found))
         blocks = report_blocks(data, pictures, output.as_posix(), ioh)
-        files.write_text(output / "report.md", to_markdown(blocks))
-        title = f"Report of {data.path.as_posix()}"
-        files.write_text(output / "report.html", to_html(title, blocks))
+        write_page(output, "report", f"Report of {data.path.as_posix()}", blocks)
         if ioh:
             export_histories(data, output / "ioh")
     return data.missing

@@ -44,6 +44,25 @@ class Rule:
     discount: float
 
 
+@dataclass(frozen=True)
+class Given:
+    """What a rule is given beside the learners' genomes.
+
+    Attributes:
+        best: genome of the best individual, `(genes,)`.
+        lessons: that the learners may live.
+        rule: how far and with what it learns.
+        space: whose bounds genomes keep.
+        rng: the source of its randomness.
+    """
+
+    best: np.ndarray
+    lessons: Lessons
+    rule: Rule
+    space: SearchSpace
+    rng: Generator
+
+
 def reward_to_go(reward: np.ndarray, discount: float) -> np.ndarray:
     """Discounted sum `(..., steps)` of the rewards `(..., steps)` from each step on."""
     sums = np.empty_like(reward)
@@ -109,66 +128,46 @@ def moved(
     return np.clip(genomes + step * unit, space.lower, space.upper)
 
 
-def by_policy_gradient(
-    genomes: np.ndarray,
-    best: np.ndarray,
-    lessons: Lessons,
-    rule: Rule,
-    space: SearchSpace,
-    rng: Generator,
-) -> np.ndarray:
+def by_policy_gradient(genomes: np.ndarray, given: Given) -> np.ndarray:
     """One step along the policy gradient, from trials lived twice on each start."""
-    life = lessons.live(np.repeat(genomes, COST, axis=0), rule.exploration)
-    direction = policy_gradient(lessons.network, genomes, life.of(len(genomes)), rule)
-    return moved(genomes, direction, rule.step, space)
+    life = given.lessons.live(np.repeat(genomes, COST, axis=0), given.rule.exploration)
+    own = life.of(len(genomes))
+    direction = policy_gradient(given.lessons.network, genomes, own, given.rule)
+    return moved(genomes, direction, given.rule.step, given.space)
 
 
-def by_imitation(
-    genomes: np.ndarray,
-    best: np.ndarray,
-    lessons: Lessons,
-    rule: Rule,
-    space: SearchSpace,
-    rng: Generator,
-) -> np.ndarray:
+def by_imitation(genomes: np.ndarray, given: Given) -> np.ndarray:
     """Several small steps towards what the best does where the learners come."""
-    network = lessons.network
-    lives = [lessons.live(genomes, 0.0) for _ in range(COST)]
+    network = given.lessons.network
+    lives = [given.lessons.live(genomes, 0.0) for _ in range(COST)]
     seen = np.concatenate([life.observation for life in lives], axis=1)[:, :, ::EVERY]
     lived = np.concatenate([life.lived for life in lives], axis=1)[:, :, ::EVERY]
     observation = seen.reshape(len(genomes), -1, seen.shape[-1])
-    action = network.decode(best)(observation)
+    action = network.decode(given.best)(observation)
     action[~lived.reshape(len(genomes), -1)] = np.nan
+    step = given.rule.step / IMITATION_STEPS
     for _ in range(IMITATION_STEPS):
         direction = imitation_gradient(network, genomes, observation, action)
-        genomes = moved(genomes, direction, rule.step / IMITATION_STEPS, space)
+        genomes = moved(genomes, direction, step, given.space)
     return genomes
 
 
-def by_perturbation(
-    genomes: np.ndarray,
-    best: np.ndarray,
-    lessons: Lessons,
-    rule: Rule,
-    space: SearchSpace,
-    rng: Generator,
-) -> np.ndarray:
+def by_perturbation(genomes: np.ndarray, given: Given) -> np.ndarray:
     """The better of a step in a random direction and one against it.
 
     The control of the other rules: the same trials and the same step, without what can
     be learnt from single control steps.
     """
-    direction = rng.normal(size=genomes.shape)
-    pair = [moved(genomes, sign * direction, rule.step, space) for sign in (1, -1)]
-    fitness = lessons.live(np.concatenate(pair), 0.0).fitness
+    direction = given.rng.normal(size=genomes.shape)
+    step, space = given.rule.step, given.space
+    pair = [moved(genomes, sign * direction, step, space) for sign in (1, -1)]
+    fitness = given.lessons.live(np.concatenate(pair), 0.0).fitness
     ahead, against = np.split(fitness, 2)
     return np.where((ahead >= against)[:, None], *pair)
 
 
-Learn = Callable[
-    [np.ndarray, np.ndarray, Lessons, Rule, SearchSpace, Generator], np.ndarray
-]
-# (genomes (n, genes), best (genes,), lessons, rule, space, rng) -> learned (n, genes)
+Learn = Callable[[np.ndarray, Given], np.ndarray]
+# (genomes (n, genes) of the learners, what it is given) -> learned (n, genes)
 LEARNING_RULES: Mapping[str, Learn] = {
     "policy_gradient": by_policy_gradient,
     "imitation": by_imitation,

@@ -11,28 +11,17 @@ Source:
     two kinds of inheritance.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike
 
 from epuck_mj.host.command_line import PART
 from epuck_mj.host.limits import check
-from evolution.search.ask_tell import (
-    Optimizer,
-    checked_state,
-    generator_state,
-    part_of,
-    restored_generator,
-)
-from evolution.search.differential_evolution import (
-    DifferentialEvolution,
-    DifferentialEvolutionParameters,
-)
-from evolution.search.learning_rules import COST, LEARNING_RULES, Rule
+from evolution.search.around_evolution import AroundEvolution
+from evolution.search.differential_evolution import DifferentialEvolutionParameters
+from evolution.search.learning_rules import COST, LEARNING_RULES, Given, Rule
 from evolution.search.lessons import Lessons
 from evolution.search.search_space import SearchSpace
 
@@ -83,12 +72,8 @@ class LifetimeLearningParameters:
             check(name, getattr(self, name))
 
 
-class LifetimeLearning(Optimizer):
-    """The optimiser 'lifetime-learning': a differential evolution with lessons.
-
-    Attributes:
-        evolution: whose population and fitness are its own.
-    """
+class LifetimeLearning(AroundEvolution):
+    """The optimiser 'lifetime-learning': a differential evolution with lessons."""
 
     needs_lessons = True
 
@@ -99,17 +84,9 @@ class LifetimeLearning(Optimizer):
         rng: Generator,
     ) -> None:
         """Draw the first population; `rng` belongs to the optimiser from here on."""
-        # the same first population as without
-        self.evolution = DifferentialEvolution(parameters.evolution, space, rng)
-        (own,) = rng.spawn(1)
-        super().__init__("lifetime-learning", self.evolution.population, own)
+        super().__init__("lifetime-learning", parameters.evolution, space, rng)
         self._parameters = parameters
-        self._space = space
         self._rule = Rule(parameters.step, parameters.exploration, parameters.discount)
-
-    def next_size(self) -> int:
-        """See `Optimizer.next_size`."""
-        return self.evolution.next_size()
 
     def next_cost(self) -> int:
         """See `Optimizer.next_cost`."""
@@ -122,32 +99,25 @@ class LifetimeLearning(Optimizer):
         """
         if self.generation == 0:
             return 0
-        share, n = self._parameters.learning_share, len(self.evolution.population)
+        share, n = self._parameters.learning_share, len(self.population)
         return min(n, round(self.next_size() * share / (1 - share) / COST))
-
-    def propose(self) -> np.ndarray:
-        """What evolution asks."""
-        return self.evolution.ask()
-
-    def to_beat(self) -> np.ndarray:
-        """See `Optimizer.to_beat`: what evolution says."""
-        if self.generation == 0:
-            return super().to_beat()
-        self.pending()
-        return self.evolution.to_beat()
 
     def learn_in_life(self, lessons: Lessons) -> None:
         """See `Optimizer.learn_in_life`."""
         learners, asked = self._learners(), self.pending().copy()
         if not learners:
             return
-        n = len(self.evolution.population)
+        n = len(self.population)
         chosen = np.sort(self.rng.choice(n, learners, replace=False)) + len(asked) - n
-        best = self.evolution.population[np.argmax(self.evolution.fitness)]
-        learn = LEARNING_RULES[self._parameters.rule]
-        asked[chosen] = learn(
-            asked[chosen], best, lessons, self._rule, self._space, self.rng
+        given = Given(
+            best=self.population[np.argmax(self.fitness)],
+            lessons=lessons,
+            rule=self._rule,
+            space=self._space,
+            rng=self.rng,
         )
+        learn = LEARNING_RULES[self._parameters.rule]
+        asked[chosen] = learn(asked[chosen], given)
         self.replace_pending(asked)
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
@@ -155,38 +125,6 @@ class LifetimeLearning(Optimizer):
 
         The champion is then a genome that was learnt, otherwise one of birth.
         """
-        if self.generation == 0:
-            self.evolution.ask()
-        elif self._parameters.inheritance == "lamarckian":
+        if self.generation and self._parameters.inheritance == "lamarckian":
             self.evolution.replace_pending(asked)
-        self.evolution.tell(told)
-        self._take_over()
-
-    def _take_over(self) -> None:
-        self.population = self.evolution.population
-        self.fitness = self.evolution.fitness
-
-    def judge_anew(self, fitness: ArrayLike) -> None:
-        """See `Optimizer.judge_anew`."""
-        self._refuse_pending("judge anew")
-        self.evolution.judge_anew(fitness)
-        self._take_over()
-
-    def restore(self, state: Mapping[str, np.ndarray]) -> None:
-        """See `Optimizer.restore`."""
-        arrays = checked_state(state, like=self.arrays())
-        rng = restored_generator(self.rng, arrays["generator"])
-        self.evolution.restore(part_of(arrays, "evolution"))
-        self.rng = rng
-        self.generation = int(arrays["generation"])
-        self._asked = None
-        self._take_over()
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """See `Optimizer.arrays`."""
-        return {
-            "name": np.array(self.name),
-            "generation": np.array(self.generation),
-            "generator": generator_state(self.rng),
-            **self.evolution.arrays_inside("evolution"),
-        }
+        super().learn(asked, told)

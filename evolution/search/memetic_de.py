@@ -16,21 +16,11 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike
 
 from epuck_mj.host.command_line import PART
 from epuck_mj.host.limits import check
-from evolution.search.ask_tell import (
-    Optimizer,
-    checked_state,
-    generator_state,
-    part_of,
-    restored_generator,
-)
-from evolution.search.differential_evolution import (
-    DifferentialEvolution,
-    DifferentialEvolutionParameters,
-)
+from evolution.search.around_evolution import AroundEvolution
+from evolution.search.differential_evolution import DifferentialEvolutionParameters
 from evolution.search.search_space import SearchSpace, refuse_wide_steps
 
 
@@ -61,12 +51,8 @@ class MemeticDeParameters:
         check("sigma", self.sigma)
 
 
-class MemeticDe(Optimizer):
-    """The optimiser 'memetic-de'.
-
-    Attributes:
-        evolution: whose population and fitness are its own.
-    """
+class MemeticDe(AroundEvolution):
+    """The optimiser 'memetic-de'."""
 
     def __init__(
         self, parameters: MemeticDeParameters, space: SearchSpace, rng: Generator
@@ -77,38 +63,28 @@ class MemeticDe(Optimizer):
             ValueError: steps wider than the bounds.
         """
         refuse_wide_steps(parameters.sigma, space)
-        # the same first population as without
-        self.evolution = DifferentialEvolution(parameters.evolution, space, rng)
-        (own,) = rng.spawn(1)
-        super().__init__("memetic-de", self.evolution.population, own)
+        super().__init__("memetic-de", parameters.evolution, space, rng)
         self._parameters = parameters
-        self._space = space
         # generations of refinement to come, and who is refined
         self._left = 0
         self._refined = np.zeros(len(self.population), dtype=bool)
 
     def next_size(self) -> int:
         """See `Optimizer.next_size`."""
-        if self._left:
-            return int(self._refined.sum())
-        return self.evolution.next_size()
+        return int(self._refined.sum()) if self._left else super().next_size()
 
     def propose(self) -> np.ndarray:
         """Candidates of those who are refined, or what evolution asks."""
         if not self._left:
-            return self.evolution.ask()
+            return super().propose()
         known = self.population[self._refined]
         candidates = known + self._parameters.sigma * self.rng.normal(size=known.shape)
         return np.clip(candidates, self._space.lower, self._space.upper)
 
     def to_beat(self) -> np.ndarray:
         """See `Optimizer.to_beat`: a candidate that is not better is forgotten."""
-        if self.generation == 0:
-            return super().to_beat()
         self.pending()
-        if self._left:
-            return self.fitness[self._refined].copy()
-        return self.evolution.to_beat()
+        return self.fitness[self._refined] if self._left else super().to_beat()
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Replace those whose candidates are better, or tell evolution."""
@@ -116,45 +92,21 @@ class MemeticDe(Optimizer):
             who = np.flatnonzero(self._refined)
             better = told > self.fitness[who]
             self.evolution.replace(who[better], asked[better], told[better])
+            self.take_over()
             self._left -= 1
-        else:
-            before = self.population
-            if self.generation == 0:
-                self.evolution.ask()
-            self.evolution.tell(told)
-            # in the first generation nobody is accepted in place of another
-            self._refined = (self.evolution.population != before).any(axis=1)
-            self._left = self._parameters.refinements if self._refined.any() else 0
-        self._take_over()
+            return
+        before = self.population
+        super().learn(asked, told)
+        # in the first generation nobody is accepted in place of another
+        self._refined = (self.population != before).any(axis=1)
+        self._left = self._parameters.refinements if self._refined.any() else 0
 
-    def _take_over(self) -> None:
-        self.population = self.evolution.population
-        self.fitness = self.evolution.fitness
-
-    def judge_anew(self, fitness: ArrayLike) -> None:
-        """See `Optimizer.judge_anew`."""
-        self._refuse_pending("judge anew")
-        self.evolution.judge_anew(fitness)
-        self._take_over()
-
-    def restore(self, state: Mapping[str, np.ndarray]) -> None:
-        """See `Optimizer.restore`."""
-        arrays = checked_state(state, like=self.arrays())
-        rng = restored_generator(self.rng, arrays["generator"])
-        self.evolution.restore(part_of(arrays, "evolution"))
-        self.rng = rng
-        self.generation = int(arrays["generation"])
+    def load(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """See `Optimizer.load`."""
+        super().load(arrays)
         self._left, self._refined = int(arrays["left"]), arrays["refined"]
-        self._asked = None
-        self._take_over()
 
     def arrays(self) -> dict[str, np.ndarray]:
         """See `Optimizer.arrays`."""
-        return {
-            "name": np.array(self.name),
-            "generation": np.array(self.generation),
-            "generator": generator_state(self.rng),
-            "left": np.array(self._left),
-            "refined": self._refined.copy(),
-            **self.evolution.arrays_inside("evolution"),
-        }
+        own = {"left": np.array(self._left), "refined": self._refined.copy()}
+        return {**super().arrays(), **own}

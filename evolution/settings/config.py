@@ -24,7 +24,6 @@ from epuck_mj.policies.topology import OwnNetwork, Topology
 from epuck_mj.scene.model_files import KINEMATIC_ROBOT, absolute
 from epuck_mj.step.conditions import Conditions, NoiseLevel
 from epuck_mj.step.control import START_CLEARANCE, TaskParameters
-from epuck_mj.step.motors import Speeds
 from evolution.search.table import SearchSpace, own_parameters
 from evolution.settings.config_errors import one_line
 from evolution.settings.config_fields import (
@@ -181,13 +180,7 @@ class ExperimentConfig(BaseModel):
     @property
     def task(self) -> TaskParameters:
         """Length, fitness, sensors and speeds of a trial."""
-        return TaskParameters(
-            steps=self.steps,
-            control_step=self.control_step,
-            fitness=self.fitness,
-            sensor_range=self.sensor_range,
-            speeds=Speeds(self.v_max, self.w_max),
-        )
+        return TaskParameters.of(self)
 
     @property
     def budget(self) -> int:

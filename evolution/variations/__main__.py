@@ -43,15 +43,8 @@ def report_variations(argv: Sequence[str]) -> int:
     if not options.studies:
         raise UserError("expected study directories")
     # slow to import
-    from epuck_mj.host import files
-    from evolution.pages.blocks import (
-        FIGURES_FOLDER,
-        Picture,
-        to_html,
-        to_markdown,
-        with_contents,
-    )
-    from evolution.pages.figure_files import write_figure
+    from evolution.pages.blocks import with_contents
+    from evolution.pages.figure_files import write_page, write_pictures
     from evolution.study.data import load_study
     from evolution.variations.variations_figure import variations_figure
     from evolution.variations.variations_page import variations_page
@@ -63,22 +56,16 @@ def report_variations(argv: Sequence[str]) -> int:
             "expected experiments that are named after de-best, de-rand or ga, got none"
         )
     found = orders(varied)
-    folder = options.output / FIGURES_FOLDER
-    with files.writing():
-        folder.mkdir(parents=True, exist_ok=True)
-    write_figure(variations_figure(varied, found), folder, FIGURE)
     caption = (
         "Every variation: held-out fitness on wheels as a share of the most, medians "
         "with quartiles; dotted: unchanged. On the right, how likely the best of three "
         "runs each have the paper's order of best stored fitness; dotted: 5 %."
     )
-    picture = Picture(FIGURE, caption, (folder / f"{FIGURE}.svg").read_bytes())
+    figures = {FIGURE: variations_figure(varied, found)}
+    (picture,) = write_pictures(options.output, figures, {FIGURE: caption})
     blocks = with_contents(variations_page(varied, found, picture))
-    with files.writing():
-        files.write_text(options.output / "variations.md", to_markdown(blocks))
-        page = to_html("Variations", blocks)
-        files.write_text(options.output / "variations.html", page)
-    print(f"Variations: {options.output / 'variations.md'}")
+    path = write_page(options.output, "variations", "Variations", blocks)
+    print(f"Variations: {path}")
     return 0
 
 
