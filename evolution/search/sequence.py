@@ -116,7 +116,7 @@ class Sequence(Optimizer):
         self.growth = max(part.growth for part in self._parts)
         self.needs_lessons = self.now.needs_lessons
         self._parameters, self._space = parameters, space
-        self._spent = self._cost = 0
+        self._spent = 0
 
     def next_size(self) -> int:
         """See `Optimizer.next_size`."""
@@ -129,12 +129,11 @@ class Sequence(Optimizer):
     def ask(self) -> np.ndarray:
         """See `Optimizer.ask`: what the present search asks."""
         self._refuse_pending("ask")
-        self._cost = self.now.next_cost()
-        self._asked = self.now.ask()
+        self._asked = self.propose()
         return self._asked.copy()
 
     def propose(self) -> np.ndarray:
-        """See `ask`, which does not need it."""
+        """What the present search asks, the first population as well."""
         return self.now.ask()
 
     def learn_in_life(self, lessons: Lessons) -> None:
@@ -149,8 +148,8 @@ class Sequence(Optimizer):
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Tell the present search; go on with the next when its share is spent."""
+        self._spent += self.now.next_cost()
         self.now.tell(told)
-        self._spent += self._cost
         self.population, self.fitness = self.now.population, self.now.fitness
         first, then = self._parts
         due = self._spent >= self._parameters.share * self._parameters.budget
