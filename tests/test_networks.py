@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from epuck_mj.bridge.drive.order import champion
 from epuck_mj.errors import UserError
 from epuck_mj.policies.file import ControllerFile, Origin, load_controller
 from epuck_mj.policies.network import Network
@@ -19,7 +20,10 @@ from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import Everybody, TaskParameters, run_trials, started
 from epuck_mj.step.motors import Speeds
 from epuck_mj.trials.recorder import record, record_trajectories
+from evolution.evaluate import evaluate_policies
 from evolution.judging.evaluation import BatchEngine, DmControlEngine, Work, evaluate
+from evolution.run.__main__ import evolve
+from tests.no_pictures import draw_nothing
 
 SHAPES = [(4, False), (1, True), (7, True)]
 SPEEDS = Speeds(0.08, 2.0)
@@ -214,6 +218,38 @@ def test_recordings_are_the_trials_of_evolution(square, topology):
     np.testing.assert_array_equal(fitness, trials.trial_fitness[0])
     work = Work(Everybody(policy), starts)
     np.testing.assert_array_equal(BatchEngine(square, TASK).run(work).fitness, fitness)
+
+
+def test_a_run_is_the_same_on_any_engine_and_its_champion_drives(
+    topology, tmp_path, monkeypatch, capsys
+):
+    """Evolution, files, tests and a robot's session."""
+    monkeypatch.chdir(tmp_path)
+    draw_nothing(monkeypatch)
+    name = next(key for key, make in NETWORKS.items() if make(4, False) == topology)
+    flags = (
+        f"robust --network {name} --evaluations 60 --steps 15 --trials 2 "
+        "--validation-starts 5 --test-starts 5"
+    )
+    for ideal, ways in (
+        ("", ("--threads 1", "--no-racing --threads 2")),
+        (
+            "--noise none --no-randomise --robot epuck ",
+            ("--threads 1", "--engine dm_control"),
+        ),
+    ):
+        for i, way in enumerate(ways):
+            assert evolve(f"{flags} {ideal}{way} --output {i}{len(ideal)}".split()) == 0
+        for file in ("history.csv", "champion.json"):
+            one, other = (tmp_path / f"{i}{len(ideal)}" / file for i in range(2))
+            assert one.read_bytes() == other.read_bytes()
+    assert "not compiled" not in capsys.readouterr().err
+    assert evaluate_policies(["00", "--starts", "3", "--noise", "calibrated"]) == 0
+    assert "3 starts" in capsys.readouterr().out
+    driver = champion(str(tmp_path / "00"))
+    assert driver.task.sensor_range == 0.06
+    action = started(driver.policy, None)(np.full(8, 0.5))
+    assert action.shape == (2,)
 
 
 @pytest.mark.parametrize("hidden", [1, 5])
