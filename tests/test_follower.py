@@ -1,5 +1,8 @@
 """The follower by rule: worked by hand, number by number."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -104,6 +107,12 @@ def test_genes_are_numbers_from_the_lowest_to_the_highest():
     batch = numbers_of(np.random.default_rng(0).uniform(-5, 5, (4, 3, 13)))
     assert batch.shape == (13, 4, 3) and batch.flags.c_contiguous
     np.testing.assert_allclose(numbers_of(genome()), list(BY_HAND.values()))
+
+
+def test_the_page_has_the_numbers():
+    page = (Path(__file__).resolve().parent.parent / "docs/transfer.md").read_text()
+    rows = re.findall(r"^\| `(\w+)` \|.*\| (\S+) \| (\S+) \|$", page, re.M)
+    assert {name: (float(low), float(high)) for name, low, high in rows} == NUMBERS
 
 
 def test_members_of_a_batch():

@@ -7,8 +7,9 @@ import pytest
 
 from epuck_mj.bridge.drive.order import champion
 from epuck_mj.errors import UserError
+from epuck_mj.policies.changes import WithChanges
 from epuck_mj.policies.file import ControllerFile, Origin, load_controller
-from epuck_mj.policies.network import Network
+from epuck_mj.policies.network import Controller, Network
 from epuck_mj.policies.topology import FEEDFORWARD, NETWORKS, Topology, topology_from
 from epuck_mj.rungs.disturbed import disturbed
 from epuck_mj.rungs.kinematic.drivers import drivers_of
@@ -65,7 +66,9 @@ def test_compiled_trials_have_the_bits_of_the_loop(square, name, shape, fitness)
     rng = np.random.default_rng(2)
     for met in (None, Conditions("strong", True).draw(rng, n, task.steps)):
         compiled = FusedTrials(square, task, 2)
-        found = compiled(topology.decode(genomes), starts, met, 1, np.full(n, -np.inf))
+        policy = topology.decode(genomes)
+        assert isinstance(policy, Controller | WithChanges)
+        found = compiled(policy, starts, met, 1, np.full(n, -np.inf))
         robots = disturbed(KinematicRobots(square, n), met, task.control_step)
         expected = run_trials(robots, topology.decode(genomes), starts, task)
         same(found, expected)

@@ -82,8 +82,8 @@ class Follower:
         Raises:
             ValueError: if the genomes have another length.
         """
-        rule = Rule(numbers_of(genomes_of(genomes, self.n_genes, "follower")))
-        return WithChanges(rule, alike=genomes.ndim == 1)
+        genomes = genomes_of(genomes, self.n_genes, "follower")
+        return WithChanges(Rule(numbers_of(genomes)), alike=genomes.ndim == 1)
 
 
 def numbers_of(genomes: np.ndarray) -> np.ndarray:
