@@ -215,7 +215,9 @@ def stored_without_checkpoint(written: Written, evolution: Evolution) -> Stored:
     if believed not in as_best and not own:
         generations = range(first, len(written.history["best"]))
         earned = _earned(evolution, genome, generations)
-        if believed not in earned:
+        least, most = earned.min(), earned.max()
+        mean = evolution.optimizer.stores_means and least <= believed <= most
+        if believed not in earned and not mean:
             believed = as_best[-1] if as_best.size else earned.max()
     alone = genome[None], np.array([believed])
     # which others the champion was chosen from, the tables do not say
