@@ -15,6 +15,7 @@ from evolution.pages.words import (
 )
 from evolution.reproduce.claims import REPLICATES
 from evolution.statistics.significance import FEWEST_FOR_STARS
+from evolution.variations.change_words import in_words
 from evolution.variations.varied import UNCHANGED, Order, Varied
 
 
@@ -39,7 +40,8 @@ def variations_page(
         Paragraph(
             "Shift: Hodges-Lehmann estimate against the unchanged algorithm with a "
             "90 % interval. p: Mann-Whitney, Holm-adjusted for all variations of this "
-            f"page. Below {FEWEST_FOR_STARS} runs there is no verdict."
+            f"page. Below {FEWEST_FOR_STARS} runs there is no verdict, and none with "
+            "another step fitness, which measures something else."
         ),
         *(_table(varied, algorithm) for algorithm in PAPERS),
     ]
@@ -74,7 +76,7 @@ def _title(order: Order) -> str:
     if order.change == UNCHANGED:
         return "nothing changed"
     where = ", ".join(LABELS[name] for name in order.varied)
-    return f"{order.change.replace('-', ' ')} ({where})"
+    return f"{in_words(order.change)} ({where})"
 
 
 def _table(varied: Sequence[Varied], algorithm: str) -> Table:
@@ -96,7 +98,7 @@ def _row(each: Varied) -> tuple[str, ...]:
         shift = f"{found.shift:z.1f} [{found.low:z.1f}, {found.high:z.1f}]"
         p = probability(each.p).removeprefix("= ")
     return (
-        each.change.replace("-", " "),
+        in_words(each.change),
         str(each.held_out.size),
         str(each.steps),
         spread(each.held_out),
