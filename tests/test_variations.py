@@ -159,8 +159,11 @@ def test_the_command_writes_page_and_figure(tmp_path, monkeypatch, capsys):
     text = (out / "variations.md").read_text()
     assert "1 variation, 48 runs in all" in text
     assert "above 5 % in 1 of 2 rows of the figure" in text
-    line = next(line for line in text.splitlines() if line.startswith("| tournament 2"))
-    assert line.endswith("| worse |")
+    order, effect = (
+        line for line in text.splitlines() if line.startswith("| tournament 2")
+    )
+    assert order == "| tournament 2 | GA | 12 | 1 | 250 | 176 | 166 | the paper's |"
+    assert effect.endswith("| worse |")
     assert (out / "figures" / f"{module.FIGURE}.png").stat().st_size > 1000
     assert "tournament 2" in (out / "variations.html").read_text()
     before = (out / "variations.md").read_bytes()

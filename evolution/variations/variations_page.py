@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Picture, Table
+from evolution.pages.blocks import Block, Heading, Paragraph, Picture, Table
 from evolution.pages.words import (
     LABELS,
     NOTHING,
@@ -35,7 +35,8 @@ def variations_page(
         ),
         picture,
         Heading("Does the paper's order come back?"),
-        *_orders(found),
+        Paragraph(orders_text(found)),
+        orders_table(found),
         Heading("Every variation"),
         Paragraph(
             "Shift: Hodges-Lehmann estimate against the unchanged algorithm with a "
@@ -47,36 +48,51 @@ def variations_page(
     ]
 
 
-def _orders(found: Sequence[Order]) -> list[Block]:
-    """Where the paper's order of best stored fitness comes back."""
+def orders_text(found: Sequence[Order]) -> str:
+    """In how many rows of the figure the paper's order comes back."""
     names = " > ".join(LABELS[name] for name in PAPERS)
-    told = [order for order in found if order.fewest >= FEWEST_FOR_STARS]
-    back = sorted(
-        (order for order in told if order.possible or order.typical),
-        key=lambda order: -order.chance,
-    )
-    lines = [
-        f"{_title(order)}: p {order.chance:.2g}; medians "
-        + ", ".join(f"{median:.0f}" for median in order.medians)
-        + ("; the medians have the order" if order.typical else "")
-        for order in back
-    ]
-    text = (
+    told = _told(found)
+    return (
         f"The paper's order is {names} in best stored fitness. The probability that "
         f"the best of {REPLICATES} of our runs each have it is above 5 % in "
         f"{sum(order.possible for order in told)} of {len(told)} rows of the figure. "
         f"The medians have it in {sum(order.typical for order in told)}. An algorithm "
         "that a change does not concern is unchanged there."
     )
-    return [Paragraph(text), *([Listing(lines)] if lines else [])]
 
 
-def _title(order: Order) -> str:
-    """What is changed, and in which algorithms."""
-    if order.change == UNCHANGED:
-        return "nothing changed"
-    where = ", ".join(LABELS[name] for name in order.varied)
-    return f"{in_words(order.change)} ({where})"
+def orders_table(found: Sequence[Order]) -> Table:
+    """Where the paper's order of best stored fitness comes back."""
+    back = sorted(
+        (order for order in _told(found) if order.possible or order.typical),
+        key=lambda order: -order.chance,
+    )
+    return Table(
+        (
+            "changed",
+            "in",
+            "fewest runs",
+            "probability of the order",
+            *(f"best stored, {LABELS[name]}" for name in PAPERS),
+            "order of medians",
+        ),
+        [
+            (
+                in_words(order.change),
+                ", ".join(LABELS[name] for name in order.varied),
+                str(order.fewest),
+                f"{order.chance:.2g}",
+                *(f"{median:.0f}" for median in order.medians),
+                "the paper's" if order.typical else "another",
+            )
+            for order in back
+        ],
+    )
+
+
+def _told(found: Sequence[Order]) -> list[Order]:
+    """Those with runs enough."""
+    return [order for order in found if order.fewest >= FEWEST_FOR_STARS]
 
 
 def _table(varied: Sequence[Varied], algorithm: str) -> Table:
