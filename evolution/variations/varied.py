@@ -20,6 +20,9 @@ from evolution.statistics.significance import (
 )
 from evolution.study.data import StudyData
 
+DECIMALS = 3
+"""Decimals of fitness in the paper."""
+
 UNCHANGED = "unchanged"
 """Name of what is not varied."""
 
@@ -151,7 +154,8 @@ def _order(
     """The order of algorithms with a change; None if one of them has no runs."""
     if not all(name in everyone for name in PAPERS):
         return None
-    samples = [everyone[name].stored for name in PAPERS]
+    # as the paper reports it: equal beyond that is equal
+    samples = [np.round(everyone[name].stored, DECIMALS) for name in PAPERS]
     return Order(
         change,
         tuple(name for name in PAPERS if name in changed),
