@@ -9,8 +9,8 @@ import numpy as np
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.pages.words import PAPERS
 from evolution.report.sections.comparisons import MARGIN
-from evolution.reproduce.claims import REPLICATES
-from evolution.reproduce.verdicts import chance_of_order
+from evolution.reproduce.claims import PAPER_BEST, REPLICATES
+from evolution.reproduce.verdicts import chance_of_best, chance_of_order
 from evolution.statistics.equivalence import Equivalence, equivalence
 from evolution.statistics.significance import (
     FEWEST_FOR_STARS,
@@ -63,6 +63,16 @@ class Varied:
     def differs(self) -> bool:
         """Whether the runs say that it differs from the unchanged algorithm."""
         return self.enough and self.p < LEVELS[0]
+
+    @property
+    def chance_of_papers(self) -> float:
+        """Probability that the paper's best ranks as extreme among these runs."""
+        return chance_of_best(self.stored, PAPER_BEST[self.algorithm], REPLICATES)
+
+    @property
+    def may_be_papers(self) -> bool:
+        """Whether the paper's best may come from runs like these."""
+        return self.enough and self.chance_of_papers >= LEVELS[0]
 
 
 @dataclass(frozen=True)
