@@ -163,6 +163,7 @@ FLAGS = {
         "resume": NAME,
         "unknown": "3",
         "randomise": "",
+        "randomise-all": "",
     },
     "study study.yaml --output out": {
         "jobs": WHOLE,
@@ -177,6 +178,7 @@ FLAGS = {
         "generations": "x,99,-1",
         "json": "no/such.json,.",
         "randomise": "",
+        "randomise-all": "",
     },
     f"{SHOW} champion.json": {
         "trials": "51," + SIZE,

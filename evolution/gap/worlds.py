@@ -128,4 +128,6 @@ def met(world: World, index: int, n: int, steps: int) -> Disturbances:
         mass=same(world.mass),
         friction=same(world.friction),
         lag=np.ones(n),
+        wider=np.zeros(n),
+        set_back=np.zeros(n),
     )
