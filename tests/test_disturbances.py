@@ -247,10 +247,9 @@ def test_bodies_are_heavier_and_slide():
 SHAPES = {"wider": [0.002, -0.001, 0.0], "set_back": [0.0, 0.002, 0.001]}
 
 
-def shaped(n=3):
-    return drawn(
-        n, QUIET, BOOK, **{name: np.array(each[:n]) for name, each in SHAPES.items()}
-    )
+def shaped():
+    wider, set_back = (np.array(each) for each in SHAPES.values())
+    return drawn(3, QUIET, BOOK, wider=wider, set_back=set_back)
 
 
 def test_readings_are_from_where_the_sensors_are(scene):
