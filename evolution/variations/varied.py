@@ -32,6 +32,7 @@ class Varied:
         algorithm: the experiment of the paper that it is like.
         change: what is changed, as the experiment's name says it; or `UNCHANGED`.
         steps: control steps of a trial, the most that a fitness can be.
+        step_fitness: name of the step fitness; another one measures something else.
         held_out: fitness of the champions on wheels, `(runs,)`.
         crash_rate: of the same trials, `(runs,)`.
         stored: best stored fitness of each run, `(runs,)`.
@@ -43,6 +44,7 @@ class Varied:
     algorithm: str
     change: str
     steps: int
+    step_fitness: str
     held_out: np.ndarray
     crash_rate: np.ndarray
     stored: np.ndarray
@@ -99,6 +101,7 @@ def varied_of(studies: Sequence[StudyData]) -> list[Varied]:
             algorithm,
             name.removeprefix(algorithm).removeprefix("-") or UNCHANGED,
             data.steps,
+            data.configs[name].fitness,
             data.held_out(name, WHEELED_ROBOT),
             np.array([run.scores.held_out[WHEELED_ROBOT].crash_rate for run in runs]),
             data.best_stored(name),
@@ -116,6 +119,7 @@ def varied_of(studies: Sequence[StudyData]) -> list[Varied]:
         for i, each in enumerate(found)
         if each.change != UNCHANGED
         and (base := bases.get((each.algorithm, each.steps))) is not None
+        and each.step_fitness == base.step_fitness
     ]
     if not compared:
         return found
