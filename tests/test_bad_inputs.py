@@ -191,6 +191,7 @@ FLAGS = {
         **dict.fromkeys(("worlds", "starts"), "1," + SIZE),
         "threads": WHOLE,
         "robot": NAME,
+        "speeds": "0,-1,inf,0.2,x,nan,1e999",
     },
     "view arena champion.json": {
         "seed": WHOLE,
