@@ -65,11 +65,12 @@ ppo: $(INSTALLED)
 	  --json results/ppo/test.json
 	$(BIN)/python -m benchmarks.ppo.figure
 
-# champions of three seeds of each experiment in other worlds, kinematic and on wheels
+# champions of three seeds of each experiment in other worlds, kinematic and on wheels;
+# fast ones are also driven slower
 gap: $(INSTALLED)
 	$(BIN)/python -m evolution.gap \
 	  $(foreach seed,1 2 3,$(PAPERS:%=results/paper/%/seed-$(seed))) \
-	  results/transfer wall-follower --output results/gap
+	  results/transfer wall-follower --speeds 0.04 0.08 --output results/gap
 
 # what git keeps of the studies in runs/, and everything that is made of it
 results: $(INSTALLED)
