@@ -115,7 +115,11 @@ class Tcp:
         self.is_open = False
         try:
             self.open()
-        except (OSError, OverflowError) as error:
+        except OverflowError:
+            raise UserError(
+                f"cannot listen on port {port}: expected one from 0 to 65535"
+            ) from None
+        except OSError as error:
             raise UserError(f"cannot listen on port {port}: {error}") from None
 
     @property
