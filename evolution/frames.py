@@ -20,7 +20,7 @@ class Study:
     Attributes:
         champions: a row per finished run: its experiment and seed, the champion's
             genome, what it is worth, and how it was tested.
-        history: a row per run and generation.
+        history: a row per run and generation; of long runs, of some generations.
         provenance: of the runs; the column `provenance` of `champions` names one of its
             `provenances` by `id`.
     """

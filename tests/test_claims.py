@@ -8,6 +8,7 @@ import pytest
 from scipy import stats
 
 from evolution.judging.scores import Believed, HeldOut, Scores
+from evolution.report.samples import best_after
 from evolution.report.sections.comparisons import comparisons, comparisons_of
 from evolution.report.sections.what_was_run import evolved_on
 from evolution.reproduce.claim import Claim
@@ -19,7 +20,7 @@ from evolution.reproduce.claims import (
     unlike,
 )
 from evolution.reproduce.first_generation import FirstGeneration, first_generation
-from evolution.reproduce.maturity import best_after, maturity, spent_until
+from evolution.reproduce.maturity import maturity, spent_until
 from evolution.reproduce.reproduction import reproduction
 from evolution.reproduce.settled import runs_needed
 from evolution.reproduce.verdicts import (
@@ -266,8 +267,8 @@ def test_fitness_after_a_budget_is_the_best_so_far():
     data = study(LIKE_THE_PAPER)
     (each, *_) = data.runs["ga"]
     within = each.history["best"][each.history["evaluations"] <= 400]
-    assert best_after(data, "ga", 400)[0] == within.max()
-    assert best_after(data, "ga", 0)[0] == 0
+    assert best_after(data.runs["ga"], 400)[0] == within.max()
+    assert best_after(data.runs["ga"], 0)[0] == 0
 
 
 def test_the_chance_of_an_order_against_drawing():

@@ -1,13 +1,19 @@
-"""Signals that come in a finaliser, out of which Python lets nothing be raised."""
+"""Signals that come in a finaliser, or while a process is started."""
 
+import os
 import signal
 import sys
+import threading
 import time
 
 import pytest
 
 from epuck_mj.host.command_line import main
-from epuck_mj.host.interruption import Interrupted, Interruption
+from epuck_mj.host.interruption import (
+    Interrupted,
+    Interruption,
+    deaf_to_interrupts,
+)
 from tests.processes import PATIENCE
 
 
@@ -74,3 +80,31 @@ def test_other_exceptions_of_finalisers_are_shown_as_ever(handlers, monkeypatch)
     with Interruption() as interruption, interruption.raising():
         Failing()
     assert [type(each.exc_value) for each in shown] == [ValueError]
+
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="needs POSIX signals")
+
+
+@linux
+@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
+def test_a_process_that_is_being_started_is_not_left_half_way(signum, handlers):
+    """Neither in this thread nor by way of another one, which does not block it."""
+    ended, reached = threading.Event(), False
+    other = threading.Thread(target=ended.wait)
+    other.start()
+    try:
+        with (
+            Interruption() as interruption,
+            pytest.raises(Interrupted),
+            interruption.raising(),
+        ):
+            with deaf_to_interrupts():
+                os.kill(os.getpid(), signum)
+                time.sleep(0.1)
+                reached = True
+            pytest.fail("the signal was lost")
+    finally:
+        ended.set()
+        other.join()
+    assert reached
+    assert interruption.signum == signum

@@ -43,7 +43,10 @@ from evolution.report.report_folder import tables
 from evolution.report.run_table import described_columns, run_rows
 from evolution.report.samples import TARGET_SHARES
 from evolution.report.sections.comparisons import compared, comparisons, comparisons_of
-from evolution.report.sections.cost_of_targets import target_costs
+from evolution.report.sections.cost_of_targets import (
+    cost_of_targets_section,
+    target_costs,
+)
 from evolution.report.sections.held_out_fitness import held_out_fitness_section
 from evolution.report.sections.success import (
     FOLLOWS,
@@ -694,6 +697,20 @@ def test_target_and_run_rows_follow_the_study_order(large):
     costs = target_costs(large)
     assert list(dict.fromkeys(cost.experiment for cost in costs)) == [*NAMES]
     assert list(dict.fromkeys(row["experiment"] for row in run_rows(large))) == [*NAMES]
+
+
+def test_best_stored_fitness_after_fixed_budgets(tmp_path):
+    data = load_study(write_study(tmp_path / "study", {"ga": [1], "de-best": [1]}))
+    spent = np.array([1000, 3000, 6001, 9000])
+    history = {"evaluations": spent, "best": np.array([10.0, 50.0, 40.0, 90.0])}
+    runs = {
+        name: tuple(replace(run, history=history) for run in each)
+        for name, each in data.runs.items()
+    }
+    text = to_markdown(cost_of_targets_section(replace(data, runs=runs)))
+    assert "after 15,000" not in text
+    assert "| experiment | after 3,000 | after 6,000 | after 9,000 |" in text
+    assert "| GA | 50.0 (n = 1) | 50.0 (n = 1) | 90.0 (n = 1) |" in text
 
 
 def test_luck_with_noise_is_held_against_starts_with_noise(tmp_path):

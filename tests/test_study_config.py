@@ -310,6 +310,11 @@ def test_more_experiments_join(here):
     both = stored.merged(study("experiments: [ga, de-best]"), Path("out"))
     assert list(both.experiments) == ["de-rand", "ga", "de-best"]
     assert both.experiments["de-best"] == load_config(find_config("de-best"))
+    # a study that has them all says the order
+    whole = study("experiments: [ga, de-best, de-rand]")
+    assert list(stored.merged(whole, Path("out")).experiments) == list(
+        whole.experiments
+    )
 
 
 @pytest.mark.parametrize(

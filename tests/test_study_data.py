@@ -15,6 +15,9 @@ from evolution.report.sections.how_to_get_every_number_again import origins
 from evolution.reproduce.reproduction import reproduction
 from evolution.run.history import read_history
 from evolution.study.data import load_study
+from evolution.study.directory import StudyDirectory
+from evolution.study.packing import pack
+from evolution.study.tables import Tables
 from tests.study_on_disk import write_study
 
 
@@ -171,3 +174,21 @@ def test_nothing_finished_is_said_in_few_words(tmp_path):
     with pytest.raises(UserError, match="no finished run") as error:
         load_study(path)
     assert len(str(error.value)) < 1000
+
+
+def test_a_study_can_be_read_while_its_runs_are_packed(tmp_path, monkeypatch):
+    path = write_study(tmp_path / "study", {"ga": [1, 2, 3]}, packed=False)
+    read = Tables.sound_runs
+
+    def packed_after(tables: Tables, *arguments):
+        monkeypatch.setattr(Tables, "sound_runs", read)
+        found = read(tables, *arguments)
+        pack(StudyDirectory(path))
+        return found
+
+    monkeypatch.setattr(Tables, "sound_runs", packed_after)
+    with pytest.raises(UserError, match="no finished run") as caught:
+        load_study(path)
+    # they are where the tables were not looked for yet: named, and there next time
+    assert "ga seed 1" in str(caught.value)
+    assert len(load_study(path).runs["ga"]) == 3

@@ -205,7 +205,15 @@ def test_an_edited_champion(what, kind, request, tmp_path, capsys):
 def test_what_may_be_left_is_less_than_a_generation(name, sizes, expected):
     space = SearchSpace(3, -5, 5, -5, 5)
     optimizer = make_optimizer(OPTIMIZERS[name], space, np.random.default_rng(0))
-    assert largest_generation(np.cumsum(sizes), optimizer) == expected
+    spent = np.cumsum(sizes)
+    history = {"evaluations": spent, "generation": np.arange(3)}
+    assert largest_generation(history, optimizer) == expected
+    # tables have some generations only, the first and the last two among them
+    last = spent[-1] + sizes[-1] * np.arange(1, 9)
+    history = {"evaluations": np.concatenate([spent, last])}
+    history["generation"] = np.arange(len(history["evaluations"]))
+    thinned = {name: column[[0, 1, 2, 6, 9, 10]] for name, column in history.items()}
+    assert largest_generation(thinned, optimizer) == expected
 
 
 def last_row_less(text: str) -> str:

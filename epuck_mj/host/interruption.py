@@ -163,7 +163,8 @@ def ignoring_interrupts() -> Iterator[None]:
 def deaf_to_interrupts() -> Iterator[None]:
     """Let processes that this thread starts in the block ignore Ctrl-C.
 
-    A Ctrl-C during the block reaches this process when the block ends.
+    Signals during the block reach this process when the block ends: a process that is
+    being started gets all that it needs.
     """
     if not hasattr(signal, "pthread_sigmask"):
         with ignoring_interrupts():
@@ -174,8 +175,33 @@ def deaf_to_interrupts() -> Iterator[None]:
 
     # the tracker lets signals in again as it starts, so it starts before the block
     resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    with _signals_kept():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _signals_kept() -> Iterator[None]:
+    """Keep back the signals that Python code handles until the block has ended.
+
+    A thread's mask does not do that: another thread of the process may get the signal,
+    and its handler then runs in the main thread.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    before = {signum: signal.getsignal(signum) for signum in SIGNALS}
+    handled = {signum: given for signum, given in before.items() if callable(given)}
+    for signum in handled:
+        signal.signal(signum, lambda signum, _: came.append(signum))
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for signum, handler in handled.items():
+            signal.signal(signum, handler)
+        for signum in came:
+            signal.raise_signal(signum)

@@ -116,3 +116,17 @@ def hits(runs: Sequence[RunData], steps: int) -> np.ndarray:
             for run in runs
         ]
     )
+
+
+BUDGETS = (3_000, 6_000, 9_000, 15_000)
+"""Evaluations after which best stored fitness is compared."""
+
+
+def best_after(runs: Sequence[RunData], budget: int) -> np.ndarray:
+    """Best stored fitness after so many evaluations, `(runs,)`; 0 if none yet."""
+    return np.array(
+        [
+            run.history["best"][run.history["evaluations"] <= budget].max(initial=0)
+            for run in runs
+        ]
+    )

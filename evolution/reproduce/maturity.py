@@ -10,6 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from evolution.pages.words import LABELS, between, probability
+from evolution.report.samples import BUDGETS, best_after
 from evolution.reproduce.claim import Claim, claim_of, samples_of
 from evolution.reproduce.verdicts import (
     CONSISTENT,
@@ -38,7 +39,7 @@ EARLY = 0.5
 MATURE_TARGET = 0.75
 """Stored fitness, as a share of the most, by which an individual is mature: 225."""
 
-MATURE_BUDGET = 3000
+MATURE_BUDGET = BUDGETS[0]
 """Evaluations that are early: the strict reading by a fixed budget."""
 
 NEVER = 1e9
@@ -79,7 +80,7 @@ def mature_by_fixed_measures(study: StudyData) -> list[Claim]:
     spent = samples_of(study, lambda name: spent_until(study, name, target))
     # sooner is better
     sooner = {name: -sample for name, sample in spent.items()}
-    best = samples_of(study, lambda name: best_after(study, name, budget))
+    best = samples_of(study, lambda name: best_after(study.runs[name], budget))
     # both questions are one family: the lowest of its p values counts most
     found = []
     for samples, where, ours in (
@@ -146,13 +147,3 @@ def spent_until(study: StudyData, name: str, target: float) -> np.ndarray:
         for run in study.runs[name]
     ]
     return np.nan_to_num(np.array(spent), nan=NEVER)
-
-
-def best_after(study: StudyData, name: str, budget: int) -> np.ndarray:
-    """Best stored fitness after so many evaluations, `(runs,)`; 0 if none yet."""
-    return np.array(
-        [
-            run.history["best"][run.history["evaluations"] <= budget].max(initial=0)
-            for run in study.runs[name]
-        ]
-    )

@@ -16,12 +16,16 @@ from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.hybrids.__main__ import report_hybrids
 from evolution.reproduce.__main__ import reproduce_paper
 from evolution.study.directory import StudyDirectory
+from evolution.variations.__main__ import report_variations
 
 REPORTED = ("paper", "wheels")
 """Studies that are reported: folders of runs/ and results/, and names of tables."""
 
 TRANSFER = "transfer"
 """Study of evolution with real sensors and motors, which the gap measures."""
+
+VARIATIONS = ("variations", "steps-150", "steps-500")
+"""Studies of the paper's algorithms with one thing changed at a time."""
 
 HYBRIDS, GOOD_ROBOT = "hybrids", "good-robot"
 """Studies of evolution that learns, and of what it taught, with a page of their own."""
@@ -30,6 +34,7 @@ PAGES: Mapping[str, tuple[str, ...]] = {
     "README.md": ("medians",),
     "docs/champions.md": ("champions",),
     "docs/findings.md": ("paper", "wheels"),
+    "docs/variations.md": ("variations",),
     "docs/transfer.md": ("gap",),
     "docs/hybrids.md": (HYBRIDS, GOOD_ROBOT),
 }
@@ -50,7 +55,7 @@ def publish(argv: Sequence[str]) -> int:
     parse(
         PublishOptions, "python -m evolution.reproduce.publish", argv, PublishOptions()
     )
-    for name in (*REPORTED, TRANSFER, HYBRIDS, GOOD_ROBOT):
+    for name in (*REPORTED, TRANSFER, HYBRIDS, GOOD_ROBOT, *VARIATIONS):
         if (Path("runs") / name).is_dir():
             ship(Path("runs") / name, Path("results") / name)
     paper, *others = (str(path) for path in shipped(Path("results")))
@@ -59,6 +64,9 @@ def publish(argv: Sequence[str]) -> int:
     hybrids = Path("results") / HYBRIDS
     if hybrids.is_dir():
         report_hybrids([str(hybrids), "--output", "results/report-hybrids"])
+    if varied := _variations(Path("results")):
+        studies = [str(path) for path in varied]
+        report_variations([*studies, "--output", "results/report-variations"])
     # git keeps the pages that it shows, with their pictures
     for file in Path("results").glob("report-*/**/*"):
         if file.suffix in (".svg", ".pdf", ".html"):
@@ -66,6 +74,11 @@ def publish(argv: Sequence[str]) -> int:
     for page, text in pages_with_tables(Path()).items():
         files.write_text(page, text)
     return 0
+
+
+def _variations(results: Path) -> list[Path]:
+    """Paths of the shipped studies of variations."""
+    return [results / name for name in VARIATIONS if (results / name).is_dir()]
 
 
 def shipped(results: Path) -> list[Path]:
@@ -124,6 +137,8 @@ def _tables(results: Path) -> dict[str, str]:
     from evolution.reproduce.champions_table import champions_table
     from evolution.reproduce.reproduction import medians_table, runs_table
     from evolution.study.data import load_study
+    from evolution.variations.variations_page import orders_table
+    from evolution.variations.varied import orders, varied_of
 
     tables, studies = {}, [load_study(path) for path in shipped(results)]
     for study in studies:
@@ -137,6 +152,9 @@ def _tables(results: Path) -> dict[str, str]:
             if path.name != TRANSFER:
                 tables[path.name] = to_markdown([worth_table(studies[-1])])
     tables["champions"] = to_markdown([champions_table(studies)])
+    if varied := _variations(results):
+        found = orders(varied_of([load_study(path) for path in varied]))
+        tables["variations"] = to_markdown([orders_table(found)])
     gap = results / "gap" / "summary.md"
     if gap.exists():
         tables["gap"] = gap.read_text(encoding="utf-8")

@@ -32,6 +32,7 @@ class AroundEvolution(Optimizer):
         self.evolution = DifferentialEvolution(parameters, space, rng)
         (own,) = rng.spawn(1)
         super().__init__(name, self.evolution.population, own)
+        self.stores_means = self.evolution.stores_means
         self._space = space
 
     def next_size(self) -> int:

@@ -147,6 +147,9 @@ class Optimizer(ABC):
     needs_lessons = False
     """Whether it wants lessons, which only the paper's network can be given."""
 
+    stores_means = False
+    """Whether stored fitness may be the mean of several evaluations."""
+
     def __init__(self, name: str, population: np.ndarray, rng: Generator) -> None:
         """Begin with genomes `(population, genes)` that have not been evaluated."""
         self.rng = rng

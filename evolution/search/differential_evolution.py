@@ -164,6 +164,7 @@ class DifferentialEvolution(Optimizer):
         shape = (parameters.population, space.genes)
         population = rng.uniform(space.init_lower, space.init_upper, size=shape)
         super().__init__(f"de-{parameters.strategy}", population, rng)
+        self.stores_means = parameters.reevaluate_best > 0
         self._parameters = parameters
         self._space = space
         # evaluations that each individual has had, whose mean is stored
@@ -243,14 +244,14 @@ class DifferentialEvolution(Optimizer):
     def load(self, arrays: Mapping[str, np.ndarray]) -> None:
         """See `Optimizer.load`."""
         super().load(arrays)
-        if self._parameters.reevaluate_best:
+        if self.stores_means:
             self._evaluations = arrays["evaluations"]
 
     def arrays(self) -> dict[str, np.ndarray]:
         """See `Optimizer.arrays`."""
         arrays = super().arrays()
         # without means it is of no use
-        if self._parameters.reevaluate_best:
+        if self.stores_means:
             arrays["evaluations"] = self._evaluations.copy()
         return arrays
 

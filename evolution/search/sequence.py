@@ -114,6 +114,7 @@ class Sequence(Optimizer):
         self.now = self._parts[0]
         super().__init__("sequence", self.now.population, own)
         self.growth = max(part.growth for part in self._parts)
+        self.stores_means = any(part.stores_means for part in self._parts)
         self.needs_lessons = self.now.needs_lessons
         self._parameters, self._space = parameters, space
         self._spent = 0

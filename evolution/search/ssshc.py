@@ -128,6 +128,8 @@ class Ssshc(Optimizer):
     that each of them has had.
     """
 
+    stores_means = True
+
     def __init__(
         self, parameters: SsshcParameters, space: SearchSpace, rng: Generator
     ) -> None:

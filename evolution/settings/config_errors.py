@@ -8,6 +8,9 @@ from pydantic import ValidationError
 from epuck_mj.host.limits import shown
 from evolution.search.table import ALGORITHMS
 
+COMPLETE = "complete"
+"""Type of an error whose message says what came."""
+
 
 def one_line(error: ValidationError, keys: Sequence[str], optimizer: type) -> str:
     """All errors of a config in one line, with the known keys if one is unknown.
@@ -32,7 +35,8 @@ def one_line(error: ValidationError, keys: Sequence[str], optimizer: type) -> st
         else:
             message = detail["msg"].removeprefix("Value error, ")
             # checks of a part as a whole may say themselves what came
-            said = detail["type"] == "value_error" and ", got " in message
+            of_whole = detail["type"] == "value_error" and ", got " in message
+            said = of_whole or detail["type"] == COMPLETE
             got = "" if said else f", got {shown(detail['input'])}"
             parts.append(f"{key}: {message}{got}")
     return "; ".join(parts)

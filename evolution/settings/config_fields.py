@@ -22,7 +22,7 @@ from epuck_mj.host.own_parts import is_own
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.fitness import FORMULAS
 from evolution.search.table import ALGORITHMS, OptimizerParameters
-from evolution.settings.config_errors import one_line
+from evolution.settings.config_errors import COMPLETE, one_line
 
 N_VALIDATION = 200
 """Default number of starts on which a champion is chosen."""
@@ -112,7 +112,8 @@ def _part(key: str, value: dict, kinds: Sequence[Any]) -> Any:
         return TypeAdapter(kind).validate_python(_checked_types(kind, value))
     except ValidationError as error:
         names = [each.name for each in fields(kind)]
-        raise ValueError(f"{key}: {one_line(error, names, kind)}") from None
+        line = {"line": f"{key}: {one_line(error, names, kind)}"}
+        raise PydanticCustomError(COMPLETE, "{line}", line) from None
 
 
 KINDS = {int: "a whole number", float: "a number", bool: "true or false"}

@@ -113,6 +113,8 @@ class StudyConfig:
     def merged(self, other: Self, path: Path) -> Self:
         """This study, stored at `path`, with the experiments of another one added.
 
+        If the other one has them all, they are in its order; else its own come last.
+
         Raises:
             UserError: naming the keys in which an experiment of both differs.
         """
@@ -125,7 +127,10 @@ class StudyConfig:
                     f"'{path}' is a study of another config; experiment '{name}' "
                     f"differs in: {', '.join(differing)}"
                 )
-        return type(self)(MappingProxyType({**self.experiments, **other.experiments}))
+        both = {**self.experiments, **other.experiments}
+        has_all = len(both) == len(other.experiments)
+        order = other.experiments if has_all else both
+        return type(self)(MappingProxyType({name: both[name] for name in order}))
 
     def to_yaml(self) -> str:
         """YAML text of all experiments with all their keys."""

@@ -130,6 +130,8 @@ def load_study(path: Path) -> StudyData:
     """
     directory = StudyDirectory(path)
     config = directory.stored_config()
+    # before the tables: a run that is packed meanwhile is in these
+    places = {name: list(directory.runs(name)) for name in config.experiments}
     packed, damaged = directory.tables.sound_runs(config)
     runs: dict[str, tuple[RunData, ...]] = {}
     missing: list[str] = []
@@ -137,17 +139,18 @@ def load_study(path: Path) -> StudyData:
     asked = directory.asked_seeds()
     for name, experiment in config.experiments.items():
         finished = []
-        seeds = directory.seeds(name)
         # those of killed studies, and of older ones
-        places: dict[int, list[RunDirectory]] = {}
-        for seed, place in directory.runs(name):
-            places.setdefault(seed, []).append(place)
+        unpacked: dict[int, list[RunDirectory]] = {}
+        for seed, place in places[name]:
+            unpacked.setdefault(seed, []).append(place)
+        in_tables = {seed for each, seed in (*packed, *damaged) if each == name}
+        seeds = sorted(in_tables | unpacked.keys())
         for seed in seeds:
             try:
                 if (name, seed) in damaged:
                     raise damaged[name, seed]
                 run = packed.get((name, seed)) or _unpacked(
-                    places[seed], name, config.with_seed(name, seed)
+                    unpacked[seed], name, config.with_seed(name, seed)
                 )
                 _check_tests(run, experiment, tested)
                 tested = tuple(run.scores.held_out)

@@ -1,4 +1,4 @@
-"""The table of histories, history.parquet: a row per run and generation."""
+"""The table of histories, history.parquet: rows of a run's generations."""
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence

@@ -18,6 +18,8 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tqdm import tqdm
+
 from epuck_mj.errors import UserError
 from epuck_mj.host.hardship import hardship
 from epuck_mj.host.interruption import deaf_to_interrupts
@@ -203,6 +205,8 @@ class _Worker:
 
 def _work(means: Means, line: Connection) -> None:
     """Main function of a worker: does jobs until its pipe is closed."""
+    # the one that tqdm makes is shared by processes, and left behind when this one ends
+    tqdm.set_lock(threading.RLock())
     threading.Thread(target=_die_with_parent, daemon=True).start()
     loaded = None
     try:

@@ -29,6 +29,7 @@ from evolution.study.provenances import (
     write_provenances,
 )
 from evolution.study.table_files import read_table, write_table
+from evolution.study.thinning import thinned
 
 
 class Tables:
@@ -170,7 +171,7 @@ class Tables:
         # the last one counts: after a kill in between the runs are added anew
         write_provenances(self.provenance, known, [id for id in used if id in known])
         _write_seconds(self.timing, {r: seconds[r] for r in kept if r in seconds})
-        write_table(self.history, merged(parts, kept, list(rank)))
+        write_table(self.history, thinned(merged(parts, kept, list(rank))))
         write_table(self.champions, table_of([rows[run] for run in kept]))
 
     def seconds(self) -> dict[Run, float]:

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from evolution.pages.style import PAGE, PRINT, legend_below, looks
 from evolution.pages.words import LABELS, PAPERS
 from evolution.statistics.significance import LEVELS
+from evolution.variations.change_words import in_words
 from evolution.variations.varied import UNCHANGED, Order, Varied
 
 ROW = 0.15
@@ -41,7 +42,7 @@ def variations_figure(varied: Sequence[Varied], found: Sequence[Order]) -> Figur
             axes.plot(order.chance, row, color="black", marker=mark, ms=4, ls="")
     axes.axvline(LEVELS[0], color="0.4", lw=0.8, ls=":")
     axes.set(title="paper's order", xlabel="probability", xlim=(-0.03, 1.03))
-    titles = [change.replace("-", " ") for _, change in rows]
+    titles = [in_words(change) for _, change in rows]
     panels[0].set_yticks(range(len(rows)), titles, fontsize=6.5)
     panels[0].set_ylim(len(rows) - 0.5, -0.5)
     point = {"color": "black", "ls": "", "ms": 4}

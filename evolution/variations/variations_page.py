@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Picture, Table
+from evolution.pages.blocks import Block, Heading, Paragraph, Picture, Table
 from evolution.pages.words import (
     LABELS,
     NOTHING,
@@ -13,8 +13,9 @@ from evolution.pages.words import (
     probability,
     spread,
 )
-from evolution.reproduce.claims import REPLICATES
+from evolution.reproduce.claims import PAPER_BEST, REPLICATES
 from evolution.statistics.significance import FEWEST_FOR_STARS
+from evolution.variations.change_words import in_words
 from evolution.variations.varied import UNCHANGED, Order, Varied
 
 
@@ -34,47 +35,89 @@ def variations_page(
         ),
         picture,
         Heading("Does the paper's order come back?"),
-        *_orders(found),
+        Paragraph(orders_text(found)),
+        orders_table(found),
+        Heading("Which may have given the paper's numbers?"),
+        Paragraph(
+            f"The paper reports the best of {REPLICATES} runs of each algorithm. Named "
+            "are the changes with which that number ranks among our runs as the best "
+            f"of {REPLICATES} more may well do (two-sided p of at least 0.05)."
+        ),
+        papers_table(varied),
         Heading("Every variation"),
         Paragraph(
             "Shift: Hodges-Lehmann estimate against the unchanged algorithm with a "
             "90 % interval. p: Mann-Whitney, Holm-adjusted for all variations of this "
-            f"page. Below {FEWEST_FOR_STARS} runs there is no verdict."
+            f"page. Below {FEWEST_FOR_STARS} runs there is no verdict, and none with "
+            "another step fitness, which measures something else."
         ),
         *(_table(varied, algorithm) for algorithm in PAPERS),
     ]
 
 
-def _orders(found: Sequence[Order]) -> list[Block]:
-    """Where the paper's order of best stored fitness comes back."""
+def orders_text(found: Sequence[Order]) -> str:
+    """In how many rows of the figure the paper's order comes back."""
     names = " > ".join(LABELS[name] for name in PAPERS)
-    told = [order for order in found if order.fewest >= FEWEST_FOR_STARS]
-    back = sorted(
-        (order for order in told if order.possible or order.typical),
-        key=lambda order: -order.chance,
-    )
-    lines = [
-        f"{_title(order)}: p {order.chance:.2g}; medians "
-        + ", ".join(f"{median:.0f}" for median in order.medians)
-        + ("; the medians have the order" if order.typical else "")
-        for order in back
-    ]
-    text = (
+    told = _told(found)
+    return (
         f"The paper's order is {names} in best stored fitness. The probability that "
         f"the best of {REPLICATES} of our runs each have it is above 5 % in "
         f"{sum(order.possible for order in told)} of {len(told)} rows of the figure. "
         f"The medians have it in {sum(order.typical for order in told)}. An algorithm "
         "that a change does not concern is unchanged there."
     )
-    return [Paragraph(text), *([Listing(lines)] if lines else [])]
 
 
-def _title(order: Order) -> str:
-    """What is changed, and in which algorithms."""
-    if order.change == UNCHANGED:
-        return "nothing changed"
-    where = ", ".join(LABELS[name] for name in order.varied)
-    return f"{order.change.replace('-', ' ')} ({where})"
+def orders_table(found: Sequence[Order]) -> Table:
+    """Where the paper's order of best stored fitness comes back."""
+    back = sorted(
+        (order for order in _told(found) if order.possible or order.typical),
+        key=lambda order: -order.chance,
+    )
+    return Table(
+        (
+            "changed",
+            "in",
+            "fewest runs",
+            "probability of the order",
+            *(f"best stored, {LABELS[name]}" for name in PAPERS),
+            "order of medians",
+        ),
+        [
+            (
+                in_words(order.change),
+                ", ".join(LABELS[name] for name in order.varied),
+                str(order.fewest),
+                f"{order.chance:.2g}",
+                *(f"{median:.0f}" for median in order.medians),
+                "the paper's" if order.typical else "another",
+            )
+            for order in back
+        ],
+    )
+
+
+def papers_table(varied: Sequence[Varied]) -> Table:
+    """The changes with which each of the paper's numbers may have come about."""
+    rows = []
+    for algorithm in PAPERS:
+        alike = [
+            each
+            for each in varied
+            if each.algorithm == algorithm and each.may_be_papers
+        ]
+        told = sorted(alike, key=lambda each: -each.chance_of_papers)
+        changes = [
+            f"{in_words(each.change)} (p {each.chance_of_papers:.2g})" for each in told
+        ]
+        best = f"{PAPER_BEST[algorithm]:g}"
+        rows.append((LABELS[algorithm], best, "; ".join(changes) or "none"))
+    return Table(("algorithm", "paper's best", "changes"), rows)
+
+
+def _told(found: Sequence[Order]) -> list[Order]:
+    """Those with runs enough."""
+    return [order for order in found if order.fewest >= FEWEST_FOR_STARS]
 
 
 def _table(varied: Sequence[Varied], algorithm: str) -> Table:
@@ -96,7 +139,7 @@ def _row(each: Varied) -> tuple[str, ...]:
         shift = f"{found.shift:z.1f} [{found.low:z.1f}, {found.high:z.1f}]"
         p = probability(each.p).removeprefix("= ")
     return (
-        each.change.replace("-", " "),
+        in_words(each.change),
         str(each.held_out.size),
         str(each.steps),
         spread(each.held_out),

@@ -9,8 +9,8 @@ import numpy as np
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.pages.words import PAPERS
 from evolution.report.sections.comparisons import MARGIN
-from evolution.reproduce.claims import REPLICATES
-from evolution.reproduce.verdicts import chance_of_order
+from evolution.reproduce.claims import PAPER_BEST, REPLICATES
+from evolution.reproduce.verdicts import chance_of_best, chance_of_order
 from evolution.statistics.equivalence import Equivalence, equivalence
 from evolution.statistics.significance import (
     FEWEST_FOR_STARS,
@@ -19,6 +19,9 @@ from evolution.statistics.significance import (
     mann_whitney,
 )
 from evolution.study.data import StudyData
+
+DECIMALS = 3
+"""Decimals of fitness in the paper."""
 
 UNCHANGED = "unchanged"
 """Name of what is not varied."""
@@ -32,6 +35,7 @@ class Varied:
         algorithm: the experiment of the paper that it is like.
         change: what is changed, as the experiment's name says it; or `UNCHANGED`.
         steps: control steps of a trial, the most that a fitness can be.
+        step_fitness: name of the step fitness; another one measures something else.
         held_out: fitness of the champions on wheels, `(runs,)`.
         crash_rate: of the same trials, `(runs,)`.
         stored: best stored fitness of each run, `(runs,)`.
@@ -43,6 +47,7 @@ class Varied:
     algorithm: str
     change: str
     steps: int
+    step_fitness: str
     held_out: np.ndarray
     crash_rate: np.ndarray
     stored: np.ndarray
@@ -58,6 +63,16 @@ class Varied:
     def differs(self) -> bool:
         """Whether the runs say that it differs from the unchanged algorithm."""
         return self.enough and self.p < LEVELS[0]
+
+    @property
+    def chance_of_papers(self) -> float:
+        """Probability that the paper's best ranks as extreme among these runs."""
+        return chance_of_best(self.stored, PAPER_BEST[self.algorithm], REPLICATES)
+
+    @property
+    def may_be_papers(self) -> bool:
+        """Whether the paper's best may come from runs like these."""
+        return self.enough and self.chance_of_papers >= LEVELS[0]
 
 
 @dataclass(frozen=True)
@@ -99,6 +114,7 @@ def varied_of(studies: Sequence[StudyData]) -> list[Varied]:
             algorithm,
             name.removeprefix(algorithm).removeprefix("-") or UNCHANGED,
             data.steps,
+            data.configs[name].fitness,
             data.held_out(name, WHEELED_ROBOT),
             np.array([run.scores.held_out[WHEELED_ROBOT].crash_rate for run in runs]),
             data.best_stored(name),
@@ -116,6 +132,7 @@ def varied_of(studies: Sequence[StudyData]) -> list[Varied]:
         for i, each in enumerate(found)
         if each.change != UNCHANGED
         and (base := bases.get((each.algorithm, each.steps))) is not None
+        and each.step_fitness == base.step_fitness
     ]
     if not compared:
         return found
@@ -147,7 +164,8 @@ def _order(
     """The order of algorithms with a change; None if one of them has no runs."""
     if not all(name in everyone for name in PAPERS):
         return None
-    samples = [everyone[name].stored for name in PAPERS]
+    # as the paper reports it: equal beyond that is equal
+    samples = [np.round(everyone[name].stored, DECIMALS) for name in PAPERS]
     return Order(
         change,
         tuple(name for name in PAPERS if name in changed),

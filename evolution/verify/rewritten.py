@@ -174,7 +174,7 @@ def _histories(written: Written, evolution: Evolution) -> Iterator[str]:
     # nobody knows how large an own optimiser's generations may be
     own = is_own(config.optimizer.algorithm)
     left = config.evaluations - spent
-    most = largest_generation(written.history["evaluations"], evolution.optimizer)
+    most = largest_generation(written.history, evolution.optimizer)
     if left < 0 or not (own or left < most):
         yield (
             f"{written.run.config.name}: evaluations {config.evaluations}, but "
@@ -183,14 +183,15 @@ def _histories(written: Written, evolution: Evolution) -> Iterator[str]:
         )
 
 
-def largest_generation(evaluations: np.ndarray, optimizer: Optimizer) -> int:
+def largest_generation(history: Mapping[str, np.ndarray], optimizer: Optimizer) -> int:
     """Most genomes that the generation after a history may have had.
 
     Args:
-        evaluations: spent after each generation, `(generations,)`.
+        history: columns by name, of all generations or of some.
         optimizer: of the run, after a few generations.
     """
-    sizes = np.diff(evaluations, prepend=0)
+    spent = np.diff(history["evaluations"], prepend=0)
+    sizes = np.ceil(spent / np.diff(history["generation"], prepend=-1))
     return max(optimizer.next_cost(), int(sizes.max()) * optimizer.growth)
 
 
@@ -213,9 +214,12 @@ def stored_without_checkpoint(written: Written, evolution: Evolution) -> Stored:
     # an own optimiser may store what it likes
     own = is_own(evolution.config.optimizer.algorithm)
     if believed not in as_best and not own:
-        generations = range(first, len(written.history["best"]))
+        generation = written.history["generation"].astype(int)
+        generations = range(generation[first], generation[-1] + 1)
         earned = _earned(evolution, genome, generations)
-        if believed not in earned:
+        least, most = earned.min(), earned.max()
+        mean = evolution.optimizer.stores_means and least <= believed <= most
+        if believed not in earned and not mean:
             believed = as_best[-1] if as_best.size else earned.max()
     alone = genome[None], np.array([believed])
     # which others the champion was chosen from, the tables do not say

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from evolution.pages.blocks import Block, Heading, Paragraph, Table
-from evolution.pages.words import evaluations, label
+from evolution.pages.words import SPREAD, evaluations, label, spread
 from evolution.report.measures import generator
-from evolution.report.samples import TARGET_SHARES, hits
+from evolution.report.samples import BUDGETS, TARGET_SHARES, best_after, hits
 from evolution.statistics.estimates import Interval
 from evolution.statistics.targets import expected_running_time_interval
 from evolution.study.data import StudyData
@@ -94,6 +94,26 @@ def cost_of_targets_section(data: StudyData) -> list[Block]:
             [
                 (label(data, name), *(_cost(found[name, goal]) for goal in goals))
                 for name in data.with_runs
+            ],
+        ),
+        *_after_budgets(data),
+    ]
+
+
+def _after_budgets(data: StudyData) -> list[Block]:
+    """Best stored fitness after fixed numbers of evaluations, if runs have so many."""
+    runs = [run for each in data.with_runs.values() for run in each]
+    most = max((run.history["evaluations"][-1] for run in runs), default=0)
+    budgets = [budget for budget in BUDGETS if budget <= most]
+    if not budgets:
+        return []
+    return [
+        Paragraph(f"Best stored fitness after fixed numbers of evaluations. {SPREAD}."),
+        Table(
+            ("experiment", *(f"after {budget:,}" for budget in budgets)),
+            [
+                (label(data, name), *(spread(best_after(each, b)) for b in budgets))
+                for name, each in data.with_runs.items()
             ],
         ),
     ]
