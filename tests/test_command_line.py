@@ -10,17 +10,14 @@ from epuck_mj.errors import UserError
 from evolution.__main__ import COMMANDS, script
 from evolution.export import export
 from evolution.run.__main__ import evolve
+from tests.processes import forget
 
 ALL = COMMANDS | ROBOT_COMMANDS
 
 
 @pytest.mark.parametrize("module", ALL)
 def test_help_ends_with_examples_in_words(module, capsys, monkeypatch, handlers):
-    # as in a fresh process
-    for name in (module, f"{module}.__main__"):
-        file = sys.modules.get(name)
-        if file is not None and not hasattr(file, "__path__"):
-            monkeypatch.delitem(sys.modules, name)
+    forget(monkeypatch, module)
     monkeypatch.setattr(sys, "argv", ["epuck-mj", module.rpartition(".")[2], "--help"])
     with pytest.raises(SystemExit) as end:
         script()

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.no_pictures import draw_nothing
-from tests.processes import PATIENCE, python_process
+from tests.processes import PATIENCE, forget, python_process
 from tests.test_fake import fake_process
 
 PAGE = (Path(__file__).resolve().parent.parent / "docs" / "lesson.md").read_text()
@@ -36,6 +36,7 @@ def test_the_lesson(alone, monkeypatch, capsys, handlers):
             continue
         python, _, *argv = quickly(command).split()
         assert python == "python"
+        forget(monkeypatch, argv[0])
         monkeypatch.setattr(sys, "argv", argv)
         with pytest.raises(SystemExit) as end:
             runpy.run_module(argv[0], run_name="__main__", alter_sys=True)
