@@ -3,6 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 RUN := runs/de-best-seed-1
+LESSON := runs/lesson
 # without the notice of mkdocs-material
 MKDOCS := NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs
 CHAMPION := results/paper/de-best/seed-1
@@ -77,14 +78,19 @@ results: $(INSTALLED)
 	$(BIN)/python -m evolution.reproduce.publish
 
 # all pictures; the first needs EGL or OSMesa, the second a Vulkan driver
-figures: $(INSTALLED) run
+figures: $(INSTALLED) $(LESSON)
 	$(BIN)/python -m evolution.replay $(CHAMPION) --starts test:0 \
 	  --image docs/champion.png
-	$(BIN)/python -m evolution.replay $(RUN) --generations 0,10,50,last \
-	  --starts test:0 --save runs/generations.rrd
+	$(BIN)/python -m evolution.replay $(LESSON) --generations 0,10,50,last \
+	  --starts test:3 --save runs/generations.rrd
 	$(BIN)/python -m evolution.replay.viewer_picture runs/generations.rrd \
-	  --output docs/replay.png --size 1400 875
+	  --output docs/replay.png
 	$(BIN)/python -m evolution.report results/paper --output results/report-paper
+
+# the run of docs/lesson.md
+$(LESSON): | $(INSTALLED)
+	$(BIN)/python -m evolution.run de-best --climb 1 --validation-starts 50 \
+	  --test-starts 100 --output $(LESSON)
 
 $(INSTALLED): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
