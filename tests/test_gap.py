@@ -239,7 +239,7 @@ def test_the_document_says_who_kept_what():
     text = to_markdown(
         gap_document(Gap(names, transfers, groups, peers_of, 5, LATENCY))
     )
-    assert "3 policies, frozen, in 4 worlds" in text
+    assert "3 policies, unchanged, in 4 worlds" in text
     assert "| a | a/seed-1 | 0.500 |" in text
     assert "50% [15%, 85%]" in text
     # kept 70.5 % and 81.25 %, mastered 50 % and 25 %

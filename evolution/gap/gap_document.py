@@ -72,27 +72,29 @@ def gap_document(gap: Gap) -> list[Block]:
     blocks: list[Block] = [
         Heading("The reality gap", 1),
         Paragraph(
-            f"{len(gap.names)} policies, frozen, in {gap.latency.size} worlds of a "
-            f"Latin hypercube, on the first {gap.starts} test starts. Home: the arena "
-            "they evolved in, ideal sensors and motors, as many starts. A world is "
-            f"mastered with at least {SHARE_KEPT:.0%} of the fitness kept and fewer "
-            f"than {COLLISIONS_MAX:g} collision per minute. Kept is the share of "
-            "fitness at home, or of an ideal robot's in that world's arena if that is "
-            "more: walls are found sooner in a smaller arena. Against home: mastered "
-            "if the fitness at home is all that counts. In brackets, 95 % intervals "
-            "over the worlds; they leave out the starts, which are the same in every "
-            "world."
+            f"{len(gap.names)} policies, unchanged, in {gap.latency.size} worlds of a "
+            f"Latin hypercube, on the first {gap.starts} test starts. Home is the "
+            "arena they evolved in, with ideal sensors and motors and as many starts. "
+            f"A policy masters a world if it keeps at least {SHARE_KEPT:.0%} of its "
+            f"fitness and has fewer than {COLLISIONS_MAX:g} collision per minute. "
+            "Kept is the fitness in the world as a share of a reference: the fitness "
+            "at home, or the fitness of an ideal robot in that world's arena if that "
+            "is higher (in a smaller arena, robots find walls sooner). Against home: "
+            "worlds mastered if the reference is always the fitness at home. In "
+            "brackets: 95 % intervals over the worlds. They do not include the spread "
+            "over starts, which are the same in every world."
         ),
         gap_summary(gap),
         Paragraph(
-            "Medians over the policies of an experiment, of their means. Randomised "
-            "robots of evolution and worlds share the ranges of wheel radius, track, "
-            "mass, friction and latency: whoever evolved on such is at home there."
+            "Each number is the median over the policies of an experiment of their "
+            "means. Worlds have the same ranges of wheel radius, track, mass, friction "
+            "and latency as the randomised robots of evolution: policies that evolved "
+            "on randomised robots have met such differences before."
         ),
         Heading("Latency"),
         Paragraph(
-            "Kept in the worlds where commands reach the wheels so many control steps "
-            "late, mean over worlds and policies."
+            "Share kept in the worlds where commands reach the wheels this many "
+            "control steps late, mean over worlds and policies."
         ),
         by_latency(gap),
     ]
@@ -131,8 +133,9 @@ def _ranks(gap: Gap) -> list[Block]:
     return [
         Heading("Ranks"),
         Paragraph(
-            "Rank correlations (Spearman) of fitness, among policies of one full speed "
-            "only: a slower one earns less at home and keeps more of it anywhere."
+            "Rank correlations (Spearman) of fitness, among policies with the same "
+            "full speed only: slower policies earn less at home and keep more of it "
+            "in every world."
         ),
         Listing(items),
     ]
