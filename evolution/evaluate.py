@@ -66,7 +66,7 @@ class Options:
 
 
 def evaluate_policies(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     check_flag("starts", options.starts)
     check_threads(options.threads)

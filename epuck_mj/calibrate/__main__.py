@@ -51,9 +51,9 @@ class Options:
 
     Attributes:
         port: port of the robot, as for the bridge.
-        output: file to write; values in it that are not measured now stay.
-        only: do only this step, instead of straight, turn and sensors.
-        verbose: messages have technical details.
+        output: file to write; values in it that are not measured now stay the same.
+        only: do only this step; otherwise all: straight, turn and sensors.
+        verbose: add technical details to messages.
     """
 
     port: Annotated[str, word("PORT")] = ""
@@ -82,7 +82,7 @@ ANSWER_MAX = 1000
 
 
 def calibrate(argv: Sequence[str], ask: Callable[[str], str] = answer) -> int:
-    """Run the command line; its exit status.
+    """Run the command line and return its exit status.
 
     Args:
         argv: what was typed.
@@ -117,7 +117,7 @@ def calibrate_robot(
     sleep: Callable[[float], None] = time.sleep,
     verbose: bool = False,
 ) -> int:
-    """Calibrate and write the file after each step; the exit status, as the bridge's.
+    """Calibrate, write the file after each step, and return the exit status.
 
     Args:
         steps: names of STEPS.

@@ -37,7 +37,7 @@ class Options:
 
 
 def check(argv: Sequence[str]) -> int:
-    """Check an arena and print the findings; the exit status."""
+    """Check an arena, print the findings, and return the exit status."""
     options = parse(Options, "python -m epuck_mj.check", argv, examples=EXAMPLES)
     check_ending("picture", options.picture, ".png")
     # physics and pictures are for a command that makes sense

@@ -160,7 +160,7 @@ def read_bytes(path: Path, most: int) -> bytes:
         UserError: if it is missing, not to be read, too large, or no file.
     """
     try:
-        # whoever opens a pipe waits for its other end
+        # opening a pipe would wait for its other end
         if _is_special(path):
             raise OSError(errno.EINVAL, NO_FILE)
         with path.open("rb") as file:

@@ -139,7 +139,7 @@ def standard_streams() -> None:
         UserError: if standard output is closed.
     """
     if sys.stderr is None:
-        # nobody wants to read it
+        # the parent process has closed it
         sys.stderr = open_nowhere()
     if sys.stdout is None:
         sys.stdout = open_nowhere()

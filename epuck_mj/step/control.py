@@ -72,7 +72,7 @@ class TaskParameters:
         steps: control steps of a trial.
         control_step: duration of a control step [s].
         fitness: name of the step fitness: `product`, `literal` or `my.py:name`.
-        sensor_range: where an obstacle stops being seen [m].
+        sensor_range: distance at which an obstacle stops being seen [m].
         speeds: what a full action means.
 
     Raises:
@@ -344,7 +344,7 @@ def run_trials(
             most = fitness.copy()
             most[active[alive]] += left
             alive &= ~lost(most)[active]
-        # those who are done leave; everything kept per robot follows
+        # drop robots whose trial is over, and everything kept for them
         if not alive.all():
             active, observation = active[alive], observation[alive]
             if not active.size:

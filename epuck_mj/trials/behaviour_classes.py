@@ -2,7 +2,7 @@
 
 The first class of the table that fits is the trial's. Failures come first: a robot
 that ends in a wall or in a corner is no wall follower, however well it began. Then
-come those that follow walls, then those that do something else.
+come trials that follow walls, then trials that do something else.
 """
 
 from collections.abc import Callable
@@ -38,7 +38,7 @@ OTHER = "other"
 
 CLASSES: MappingProxyType[str, Callable[[Behaviour], np.ndarray]] = MappingProxyType(
     {
-        # whatever went before
+        # a crash, whatever the robot did before it
         "crashed": lambda b: b.crashed,
         # all its life on one spot, turning
         "spinner": lambda b: (b.reach < SPOT) & (np.abs(b.turn) >= ROUND),

@@ -59,7 +59,7 @@ class Options:
 
 
 def view(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(Options, "python -m epuck_mj.view", argv, examples=EXAMPLES)
     check_flag("seed", options.seed)
     policy: Policy = WallFollower()
@@ -119,7 +119,7 @@ def _evolved_with(champion: Path) -> Conditions | None:
             None if calibration is None else Calibration.from_dict(calibration),
         )
     except (KeyError, ValueError) as error:
-        raise UserError(f"'{config}' is no config of a run: {error}") from None
+        raise UserError(f"'{config}' is not the config of a run: {error}") from None
 
 
 def _starts(scene: "Scene", options: Options) -> Iterator[np.ndarray]:

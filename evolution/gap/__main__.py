@@ -29,7 +29,7 @@ class GapOptions:
         paths: run or study directories, controller files, or wall-follower.
         output: folder for gap.md, summary.md, gap.json, gap.csv and figures.
         worlds: number of worlds.
-        starts: number of test starts in each world and at home.
+        starts: number of test starts in each world and in the arena of evolution.
         robot: robot that drives; epuck_kinematic and epuck if not given.
         threads: threads that step the robots; 0 is one per core. Changes no result.
     """
@@ -43,7 +43,7 @@ class GapOptions:
 
 
 def measure_gap(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(GapOptions, "python -m evolution.gap", argv, examples=EXAMPLES)
     check_flag("worlds", options.worlds)
     check_flag("starts", options.starts, "worlds")

@@ -207,7 +207,7 @@ class DmControlEngine:
         """
         if work.disturbances is not None:
             raise ValueError("expected no disturbances with engine dm_control")
-        # dm_control for those who use it
+        # dm_control is slow to import
         from epuck_mj.environments.dm_control import (
             FollowWalls,
             PhysicsError,

@@ -16,7 +16,7 @@ EXAMPLES = (
 
 
 def replay(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     check_ending("save", options.save, ".rrd")
     check_ending("video", options.video, ".mp4")

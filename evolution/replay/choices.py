@@ -92,8 +92,8 @@ def scene_for(options: Options, policies: Sequence[NamedPolicy]) -> Scene:
     arenas = dict.fromkeys(policy.arena for policy in policies) or {"arena": None}
     if options.arena is None and len(arenas) > 1:
         raise UserError(
-            f"evolved in different arenas ({', '.join(arenas)}): expected --arena to "
-            "say in which they are to be compared"
+            f"the policies evolved in different arenas ({', '.join(arenas)}): expected "
+            "--arena with the arena in which to compare them"
         )
     control_steps = {policy.task.control_step for policy in policies} or {0.1}
     if len(control_steps) > 1:

@@ -123,7 +123,7 @@ def _until(attempt: Callable[[], Value | None]) -> Value:
 
 
 def picture_viewer(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(
         ViewerPictureOptions, "python -m evolution.replay.viewer_picture", argv
     )

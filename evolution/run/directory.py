@@ -147,9 +147,9 @@ class RunDirectory:
             self.restore_checkpoint(evolution)
         elif files.is_file(self.champion) or files.is_file(self.history):
             raise UserError(
-                f"cannot resume '{self.path}': without '{self.checkpoint.name}' the "
-                "run could only begin again, over what is there: remove it, or begin "
-                "in another directory"
+                f"cannot resume '{self.path}': '{self.checkpoint.name}' is missing, so "
+                "the run would begin again and overwrite its files: remove the "
+                "directory, or choose another one"
             )
         with files.writing():
             files.remove_leftovers(self.path)

@@ -136,7 +136,7 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
     Raises:
         ConnectionError: if the viewer was closed, or accepts nothing.
     """
-    # rerun is loaded by those who use it
+    # rerun is slow to import
     from epuck_mj.show.recording.live import LiveView
 
     scene = load_scene(config.robot, config.arena, config.control_step)

@@ -142,7 +142,7 @@ class Optimizer(ABC):
     """
 
     growth = 1
-    """A generation costs at most so many times as much as any that has been."""
+    """Most that a generation costs, as a multiple of the costliest one before it."""
 
     needs_lessons = False
     """Whether it wants lessons, which only the paper's network can be given."""

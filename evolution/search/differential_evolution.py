@@ -101,10 +101,10 @@ class DifferentialEvolutionParameters:
         reevaluate_parents: from the second generation on, evaluate parents and trial
             vectors together, and compare and store their new fitness only. A generation
             then costs 2 N evaluations.
-        reevaluate_best: from the second generation on, evaluate so many of the best
-            individuals again, together with the trial vectors. What is compared and
-            stored of an individual is the mean of all evaluations that it has had. A
-            generation costs so many evaluations more. Not with `reevaluate_parents`.
+        reevaluate_best: from the second generation on, evaluate this number of best
+            individuals again, together with the trial vectors. An individual's fitness
+            is then the mean of all its evaluations. A generation costs this number of
+            evaluations more. Not with `reevaluate_parents`.
         algorithm: the algorithm's name in configurations.
 
     Raises:
@@ -177,7 +177,7 @@ class DifferentialEvolution(Optimizer):
     def to_beat(self) -> np.ndarray:
         """See `Optimizer.to_beat`: a trial that does not beat its parent is forgotten.
 
-        Without a limit in the initial population, for those who are evaluated again,
+        Without a limit in the initial population, for individuals evaluated again,
         and for their trials, since it changes what these have to beat.
         """
         self.pending()
@@ -187,7 +187,7 @@ class DifferentialEvolution(Optimizer):
         return np.concatenate([np.full(len(again), -np.inf), parents])
 
     def _reevaluated(self) -> np.ndarray:
-        """Indices of those who are evaluated again in this generation, ascending."""
+        """Indices of the individuals to evaluate again, ascending."""
         parameters = self._parameters
         if self.generation == 0:
             return np.arange(0)
@@ -196,7 +196,7 @@ class DifferentialEvolution(Optimizer):
         return best_of(self.fitness, parameters.reevaluate_best)
 
     def propose(self) -> np.ndarray:
-        """The trials, after those who are evaluated again."""
+        """The trial vectors, after the individuals that are evaluated again."""
         return np.concatenate([self.population[self._reevaluated()], self._trials()])
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:

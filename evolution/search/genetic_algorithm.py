@@ -158,9 +158,9 @@ class GeneticAlgorithmParameters:
         mutation: probability in [0, 1] that a bit is flipped.
         elites: number of best individuals that enter the next generation unchanged.
             They are evaluated again, so an elite can lose its place by bad luck.
-        coding: of a gene's level in bits: binary, or gray, in which levels that follow
-            one another differ in one bit.
-        crossover_points: 1, tails are exchanged, or 2, middles are.
+        coding: how a gene's level is written in bits: binary, or gray, in which
+            neighbouring levels differ in one bit.
+        crossover_points: 1 (tails are exchanged) or 2 (middles are exchanged).
         algorithm: the algorithm's name in configurations.
 
     Raises:

@@ -27,7 +27,7 @@ class ImitatorsParameters:
     """Parameters of imitators.
 
     Attributes:
-        population: number of them, at least 1.
+        population: number of imitators, at least 1.
         demonstrations: evaluations in which the wall follower drives, at least 1.
         learning_rate: first length of the steps of a weight, which falls to 0.
         algorithm: the algorithm's name in configurations.

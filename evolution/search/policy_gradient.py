@@ -31,8 +31,9 @@ class PolicyGradientParameters:
     Attributes:
         batch: evaluations in which the controller explores in each generation.
         learning_rate: of Adam: length of the steps of a weight.
-        exploration: standard deviation of what is added to the sums of v and w.
-        discount: of a reward one control step later.
+        exploration: standard deviation of the noise that is added to the weighted
+            sums of v and w.
+        discount: factor of a reward one control step later.
         algorithm: the algorithm's name in configurations.
 
     Raises:

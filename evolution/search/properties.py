@@ -55,7 +55,7 @@ def check_optimizer(algorithm: str, **parameters: Any) -> None:
         except Exception as error:
             why = " ".join(f"{type(error).__name__} {error}".split())
             raise UserError(
-                f"optimiser '{algorithm}': not so: {name} ({why})"
+                f"optimiser '{algorithm}': this does not hold: {name} ({why})"
             ) from None
 
 
@@ -92,7 +92,7 @@ def refused(kind: type[Exception], words: str, call: Callable[..., Any], *given:
     except kind as error:
         require(words in str(error), f"expected '{words}' in '{error}'")
     else:
-        raise AssertionError(f"{kind.__name__} expected, '{words}'")
+        raise AssertionError(f"expected {kind.__name__} with '{words}'")
 
 
 def same(a: Optimizer, b: Optimizer) -> None:

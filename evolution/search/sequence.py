@@ -41,8 +41,8 @@ class SequenceParameters:
             imitators.
         then: parameters of the search that goes on: differential evolution, with as
             many individuals as the first, or CMA-ES.
-        share: of the evaluations, that the first spends, 0 to 1; at least one
-            generation.
+        share: share of the evaluations that the first search spends, 0 to 1; at
+            least one generation.
         budget: evaluations of both together; 0 is the run's.
         algorithm: the algorithm's name in configurations.
 

@@ -95,10 +95,10 @@ class SsshcParameters:
     """Parameters of SSSHC.
 
     Attributes:
-        population: number of parents, at least 1. A selection costs twice as many
-            evaluations, a refinement as many.
+        population: number of parents, at least 1. A selection costs twice this
+            number of evaluations, a refinement this number.
         mutation: probability in [0, 1] that a gene of an offspring is drawn anew.
-        stochasticity: noise of the fitness in selection, in [0, 1], as a share of it.
+        stochasticity: noise of the fitness in selection, as a share of it, in [0, 1].
         refinements: generations of refinement after each selection; 0 is a steady state
             without hill climbing.
         algorithm: the algorithm's name in configurations.

@@ -76,7 +76,7 @@ class Options:
 
 
 def study(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status, 1 if a run failed.
+    """Run the command line and return its exit status, 1 if a run failed.
 
     Raises:
         UserError: for anything the user can put right.

@@ -44,7 +44,7 @@ class StudyDirectory:
     @property
     def tables(self) -> "Tables":
         """The tables of finished runs, which need not be there."""
-        # arrow is for those who read them
+        # pyarrow is slow to import
         from evolution.study.tables import Tables
 
         return Tables(self.path)

@@ -150,7 +150,7 @@ def histories_in(table: pa.Table) -> dict[Run, History]:
         rises = (np.diff(history["evaluations"], prepend=0) > 0).all()
         finite = all(np.isfinite(history[name]).all() for name in HISTORY)
         if run in found or not rises or not finite:
-            raise ValueError(f"the history of {run[0]} seed {run[1]} is no such")
+            raise ValueError(f"the history of {run[0]} seed {run[1]} is invalid")
         found[run] = history
     return found
 

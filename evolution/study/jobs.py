@@ -123,7 +123,7 @@ def generations(
     Raises:
         UserError: for anything the user can put right.
     """
-    # MuJoCo is for those who simulate: the study itself does not
+    # MuJoCo is slow to import, and the study's own process does not need it
     from evolution.run.execution import Run
 
     directory = job.run
@@ -229,7 +229,7 @@ def _work(means: Means, line: Connection) -> None:
 
 
 def _nothing_loaded(means: Means) -> "Loaded":
-    # MuJoCo is for those who simulate
+    # MuJoCo is slow to import
     from evolution.run.execution import Loaded
 
     return Loaded(means.threads)

@@ -51,7 +51,7 @@ class Options:
 
 
 def verify(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     check_threads(options.threads)
     runs = [run for path in options.paths for run in _runs(path)]

@@ -171,7 +171,7 @@ def _histories(written: Written, evolution: Evolution) -> Iterator[str]:
         name, best = CHAMPIONS, [max(best[int(climbed.argmax()) :])][: len(fitness)]
     yield from lines_of_differences(name, {"fitness": fitness}, {"fitness": best})
     spent, config = int(written.history["evaluations"][-1]), evolution.config
-    # nobody knows how large an own optimiser's generations may be
+    # the size of an own optimiser's generations is not known
     own = is_own(config.optimizer.algorithm)
     left = config.evaluations - spent
     most = largest_generation(written.history, evolution.optimizer)

@@ -25,7 +25,7 @@ def drive_alone(
     show: Show,
     clock: Callable[[], float] = time.monotonic,
 ) -> int:
-    """Drive, stop, write the log; the exit status.
+    """Drive, stop, write the log, and return the exit status.
 
     Args:
         mission: what to do.

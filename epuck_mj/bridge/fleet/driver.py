@@ -79,7 +79,7 @@ class Reporter:
 
 
 def drive(argv: Sequence[str]) -> int:
-    """Drive a robot as ordered; the exit status, as the bridge's."""
+    """Drive a robot as ordered and return the exit status of the bridge."""
     # beside the drive itself, nothing ends this process before its time
     for signum in SIGNALS:
         signal.signal(signum, signal.SIG_IGN)
@@ -101,7 +101,7 @@ def drive(argv: Sequence[str]) -> int:
             reporter.report(OVER, word, facts=facts)
             output.finish()
         except OutputLost:
-            # the fleet is gone; the robot stands
+            # the fleet has ended; the robot already stands still
             pass
     if status == RUNAWAY:
         leave_to_last_resort(order.port)

@@ -182,7 +182,7 @@ class FleetDrive:
 
 
 def drive_fleet(orders: Mapping[str, Order], shows: Mapping[str, Show]) -> int:
-    """Drive robots, stop them, write their logs; the exit status.
+    """Drive robots, stop them, write their logs, and return the exit status.
 
     Args:
         orders: by the robots' names.

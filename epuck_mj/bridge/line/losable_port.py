@@ -45,8 +45,8 @@ class LosablePort:
             self._port = in_time(self._open_port, seconds, late=_close)
         except TimeoutError:
             raise UserError(
-                f"the port did not open in {seconds:.1f} s and was left. Is the robot "
-                "switched on and near enough?"
+                f"the port did not open within {seconds:.1f} s. Is the robot switched "
+                "on and near enough?"
             ) from None
 
     def send(self, data: bytes) -> None:

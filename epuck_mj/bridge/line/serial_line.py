@@ -23,7 +23,7 @@ class SerialLine:
     def greet(self) -> Greeting:
         """See Connection."""
         until = self._link.clock() + CONNECT_TIME_MAX
-        # whatever it did before we came: first it stands still
+        # the robot may still be driving: stop it first
         try:
             self._link.order(ascii.stop_order(), self._link.clock() + STOP_REPLY_TIME)
         except LinkLost:
