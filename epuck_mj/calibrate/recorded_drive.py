@@ -38,7 +38,7 @@ class RecordedDrive:
 
     @property
     def way(self) -> float:
-        """Mean angle by which the wheels turned, back and forth alike [rad]."""
+        """Mean angle by which the wheels turned, in either direction [rad]."""
         return float(np.abs(np.diff(self.steps, axis=0)).mean(axis=1).sum()) * (
             STEP_ANGLE
         )

@@ -99,7 +99,7 @@ def missing_files(files: SourceFiles) -> list[Finding]:
 
 
 def settings_not_used(files: SourceFiles) -> list[str]:
-    """What an arena says of physics that is the robot's own in a scene, as text."""
+    """An arena's settings of physics that are not used in a scene, as text."""
     inside = False
     found = []
     touch: dict[str, list[str]] = {name: [] for name in TOUCH}

@@ -96,7 +96,7 @@ class Interruption:
 def not_dropped(
     kind: type[BaseException], again: Callable[[], object]
 ) -> Iterator[None]:
-    """Have a signal's exception raised again if Python drops it in the block.
+    """Raise a signal's exception again if Python drops it in the block.
 
     A signal may come while a finaliser runs, out of which nothing can be raised: Python
     prints the exception and goes on.

@@ -32,7 +32,7 @@ class OutputLost(UserError):
 class Output:
     """A stream of text that never makes its writer wait.
 
-    Texts that nobody takes in time are dropped: a terminal may be stopped (Ctrl-S) or
+    Texts that are not read in time are dropped: a terminal may be stopped (Ctrl-S) or
     far away, and a program may forget to read.
     """
 
@@ -150,12 +150,12 @@ def standard_streams() -> None:
 
 
 def open_nowhere() -> TextIO:
-    """A stream that forgets everything."""
+    """A stream that drops all text."""
     return Path(os.devnull).open("w", encoding="utf-8")
 
 
 def give_up_streams() -> None:
-    """Let streams that cannot be written forget what they hold.
+    """Drop the text that is left in streams that cannot be written.
 
     Python's own flush at the end would complain of it.
     """
@@ -167,7 +167,7 @@ def give_up_streams() -> None:
 
 
 def abandon(stream: TextIO) -> None:
-    """Lose what a stream could not write, for which python waits as it ends."""
+    """Drop what a stream could not write, so that python can end without a wait."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 

@@ -36,7 +36,7 @@ def write_report(study: Path, output: Path, ioh: bool = False) -> tuple[str, ...
         pictures, lacking = draw_figures(data, output)
         if not data.yardstick:
             where = "not tested in the setting of all"
-            lacking.append(f"{YARDSTICK}: {where}, nothing can be held against it")
+            lacking.append(f"{YARDSTICK}: {where}, nothing can be compared with it")
         data = replace(data, missing=(*data.missing, *lacking))
         for name, text in tables(data).items():
             files.write_text(output / name, text)

@@ -29,7 +29,7 @@ def crash_rates(tests: Sequence[HeldOut]) -> np.ndarray:
 
 
 def known(values: Sequence[float]) -> np.ndarray:
-    """Those of the values that are not nan, `(n,)`."""
+    """The values that are not nan, `(n,)`."""
     return np.array([value for value in values if not math.isnan(value)])
 
 

@@ -67,7 +67,7 @@ class Stored:
 
 
 def stored_by(evolution: Evolution) -> Stored:
-    """What a run has stored by now; of one that has climbed, since then."""
+    """What a run has stored so far; if it has climbed, since the climb."""
     same = [record.climbed == evolution.climbed for record in evolution.records]
     first = same.index(True)
     return Stored(

@@ -39,7 +39,7 @@ Stage = Callable[[str, int, int], None]
 
 
 def silent(text: str, number: int = 0, stages: int = 0) -> None:
-    """A `Stage` that tells nobody."""
+    """A `Stage` that shows nothing."""
 
 
 def write_results(

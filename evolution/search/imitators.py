@@ -1,4 +1,4 @@
-"""Imitators: networks that were taught to act as the hand-written wall follower.
+"""Imitators: networks that were taught to act like the hand-written wall follower.
 
 The first and only generation: random genomes, each taught by gradient on what the
 follower did in some trials, which are paid. It is a beginning for other searches, see

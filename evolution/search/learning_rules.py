@@ -137,7 +137,7 @@ def by_policy_gradient(genomes: np.ndarray, given: Given) -> np.ndarray:
 
 
 def by_imitation(genomes: np.ndarray, given: Given) -> np.ndarray:
-    """Several small steps towards what the best does where the learners come."""
+    """Several small steps towards the actions that the best would take instead."""
     network = given.lessons.network
     lives = [given.lessons.live(genomes, 0.0) for _ in range(COST)]
     seen = np.concatenate([life.observation for life in lives], axis=1)[:, :, ::EVERY]

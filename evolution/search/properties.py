@@ -65,7 +65,7 @@ def sphere(genomes: np.ndarray) -> np.ndarray:
 
 
 def evolved(optimizer: Optimizer, generations: int, fitness: Fitness = sphere):
-    """The optimiser itself, so many generations later."""
+    """The optimiser itself, after a number of generations."""
     for _ in range(generations):
         optimizer.tell(fitness(optimizer.ask()))
     return optimizer

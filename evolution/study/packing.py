@@ -137,7 +137,7 @@ class Packer:
         self._cost = self._last - started
 
     def when_due(self) -> None:
-        """Pack if the last packing is long ago; what hinders it is left for later."""
+        """Pack if the last packing is long ago; try again later if it fails."""
         if time.monotonic() - self._last > SHARE * self._cost:
             with suppress(UserError):
                 self.now()

@@ -74,7 +74,7 @@ def drive_alone(
 
 
 class Terminal:
-    """A terminal, or a pipe: who watches a robot that drives alone."""
+    """Watcher of a robot that drives alone, on a terminal or a pipe."""
 
     def __init__(self, mission: Mission, output: Output, keys: Keyboard) -> None:
         """Say nothing yet."""

@@ -171,7 +171,7 @@ class RealRobot:
         Raises:
             StaleReading: if there was no reading for READING_AGE_MAX.
             RobotRestarted: if it was reset.
-            LinkLost: if the port is gone.
+            LinkLost: if the port was lost.
         """
         rates = (0, 0) if self._dry_run else self.told(command)
         if rates != self._rates:

@@ -53,7 +53,7 @@ class Pty:
         return str(self._link)
 
     def open(self) -> None:
-        """Appear."""
+        """Make the robot's port appear."""
         self._master, self._slave = os.openpty()
         # nothing is echoed or changed, even before a host says so
         tty.setraw(self._slave)
@@ -66,7 +66,7 @@ class Pty:
             raise
 
     def close(self) -> None:
-        """Vanish."""
+        """Make the robot's port disappear."""
         if not self.is_open:
             return
         self.is_open = False

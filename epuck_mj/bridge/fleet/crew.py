@@ -45,7 +45,7 @@ class Report:
         kind: MET, LINE, SAID or OVER of `driver`, or GONE.
         text: for a person.
         facts: summary of a drive that is over.
-        status: exit status of a driver that is gone.
+        status: exit status of a driver that has ended.
     """
 
     name: str

@@ -41,7 +41,7 @@ MET, LINE, SAID, OVER = "met", "line", "said", "over"
 
 
 class Reporter:
-    """The fleet, as a driver sees it: who watches, says go, and stops it."""
+    """Watcher that reports to the fleet, waits for its GO, and obeys its stop."""
 
     def __init__(self, output: Output) -> None:
         """Report nothing yet."""

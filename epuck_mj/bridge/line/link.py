@@ -95,7 +95,7 @@ class Link:
             BridgeError: if the reply does not come, or something else does; the link
                 then is out of step.
             RobotRestarted: if the robot was reset.
-            LinkLost: if the port is gone.
+            LinkLost: if the port was lost.
         """
         binary = request.out.endswith(b"\0")
         stale = self._rest + self._port.receive(0.0)
@@ -112,7 +112,7 @@ class Link:
         return self._exchange(request, until)
 
     def order(self, request: Request[T], until: float) -> T:
-        """Send a request in ASCII whatever was heard and however it is; its reply.
+        """Send a request in ASCII in any state of the link; return its reply.
 
         Args:
             request: what to ask.
@@ -159,7 +159,7 @@ class Link:
 
         Raises:
             BridgeError: if no e-puck answers.
-            LinkLost: if the port is gone.
+            LinkLost: if the port was lost.
         """
         restarted, came = False, b""
         while True:
@@ -193,7 +193,7 @@ class Link:
         """Drop bytes until none has come for a while, or until a time; the bytes.
 
         Raises:
-            LinkLost: if the port is gone.
+            LinkLost: if the port was lost.
         """
         came = b""
         heard = self.clock()
@@ -208,7 +208,7 @@ class Link:
         """End any command that the robot waits to complete; ASCII has to follow.
 
         Raises:
-            LinkLost: if the port is gone.
+            LinkLost: if the port was lost.
         """
         self._rest = b""
         self._port.receive(0.0)

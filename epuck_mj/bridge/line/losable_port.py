@@ -1,4 +1,4 @@
-"""Ports that may be lost at any time and opened again, and never keep one waiting."""
+"""Ports that may be lost at any time and opened again, with a limit to every wait."""
 
 import contextlib
 from collections.abc import Callable
@@ -66,7 +66,7 @@ class LosablePort:
             raise
 
     def close(self) -> None:
-        """See Port; what takes too long goes on without us."""
+        """See Port; a close that takes too long goes on in the background."""
         port, self._port = self._port, None
         if port is not None:
             with contextlib.suppress(TimeoutError):

@@ -50,7 +50,7 @@ class SerialLine:
         Raises:
             BridgeError: if that fails; names what was wrong first.
             RobotRestarted: if the robot was reset.
-            LinkLost: if the port is gone.
+            LinkLost: if the port was lost.
         """
         first: BridgeError | None = None
         while True:

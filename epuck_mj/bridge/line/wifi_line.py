@@ -73,7 +73,7 @@ class WifiLine:
 
         Raises:
             BridgeError: if what comes is no packet, or nothing comes.
-            LinkLost: if the connection is gone.
+            LinkLost: if the connection was lost.
         """
         if changed:
             self._port.send(wifi_command(left, right))

@@ -48,7 +48,7 @@ class Comparison(Contest):
 
     @property
     def equivalent(self) -> bool:
-        """Whether the runs say that the two differ by less than the margin."""
+        """Whether the runs show that the two differ by less than the margin."""
         return self.enough and self.p_equivalence < LEVELS[0]
 
     def turned(self) -> Self:

@@ -49,7 +49,7 @@ class Outcomes:
 
 
 def outcomes(data: StudyData) -> list[Outcomes]:
-    """What of each criterion and robot is known.
+    """Outcomes of each criterion on each robot, as far as they are known.
 
     Without a yardstick there is no `MATCHES`, without behaviour classes no other.
     """
