@@ -369,7 +369,7 @@ def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
     )
     assert other.in_lines(20.0).splitlines()[-1] == (
         "The highest fitness that evolution stored was 9.0, of an individual that "
-        "fresh starts give 3.0"
+        "earns 3.0 on fresh starts"
     )
     # of an unknown maximum nothing is said
     assert " of 20" not in scores.in_lines(None)
