@@ -125,7 +125,7 @@ def calibrate_robot(
         connect: opens the way to the robot.
         ask: shows a question and gives the answer.
         clock: what the connection tells times by.
-        sleep: lets so many seconds go by.
+        sleep: waits for a number of seconds.
         verbose: whether messages have details.
 
     Raises:

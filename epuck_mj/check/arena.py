@@ -84,7 +84,7 @@ def check_arena(
     Args:
         arena: name of a shipped arena, or path of an MJCF.
         robots: names of shipped robots, or paths of MJCF files.
-        tell: what is told what is being done: large arenas take half a minute.
+        tell: called with the current step, as text: large arenas take half a minute.
 
     Raises:
         UserError: if the arena cannot be read, or a robot cannot be used at all.

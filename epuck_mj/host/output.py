@@ -1,6 +1,6 @@
 """Standard output and error, which may be closed, full, or read by nobody.
 
-Only what every Python has is imported: this is there before all else is loaded.
+This module imports only the standard library, because it is loaded first.
 """
 
 import contextlib

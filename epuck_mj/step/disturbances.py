@@ -148,7 +148,7 @@ class Disturbances:
         return type(self)(**{**arrays, "of": self.of[index]})
 
     def renew(self, which: np.ndarray, others: Self) -> None:
-        """Put other disturbances in the place of those of some trials, in the arrays.
+        """Replace the disturbances of some trials, in the arrays.
 
         Args:
             which: numbers of these trials, `(k,)`.

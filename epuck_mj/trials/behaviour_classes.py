@@ -70,8 +70,8 @@ MEANINGS: MappingProxyType[str, str] = MappingProxyType(
         f"{LAST_TIME:.0f} s",
         "hugger": f"a wall follower with a mean clearance below {HUG * 1000:.0f} mm",
         "wall follower": f"within {PROXIMITY_RANGE * 1000:.0f} mm of walls for at "
-        f"least {FOLLOWING_SHARE:.0%} of the time since the first wall, which is at least "
-        f"{FOLLOWING_TIME:.0f} s, and making progress along walls at "
+        f"least {FOLLOWING_SHARE:.0%} of the time since the first wall, which is at "
+        f"least {FOLLOWING_TIME:.0f} s, and making progress along walls at "
         f"{FOLLOWING_SPEED:.0%} of the top speed or faster",
         "circler": "drove round in the open, with at most one visit to a wall a round",
         "bouncer": f"drove from wall to wall, with at least {BOUNCES} visits",

@@ -3,9 +3,10 @@
 Two engines with the same bits: `batch` steps all robots at once on
 `mujoco.batch.Batch`; `dm_control` steps the dm_control task, one trial after another.
 
-Racing: an individual that only matters if it exceeds a known fitness is ended as soon
-as it cannot reach that any more, since no control step is worth more than 1. One that
-exceeds it has all its trials, so every comparison has the same outcome.
+Racing: some individuals matter only if they exceed a known fitness. The trials of such
+an individual end as soon as it cannot exceed that fitness any more, since no control
+step is worth more than 1. An individual that exceeds it has all its trials, so every
+comparison has the same outcome.
 """
 
 from collections.abc import Iterator

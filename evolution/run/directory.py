@@ -115,7 +115,7 @@ class RunDirectory:
 
     @property
     def begun(self) -> bool:
-        """Whether there is a run that can be gone on with."""
+        """Whether there is a run that can be continued."""
         return files.is_file(self.config) or files.is_file(self.checkpoint)
 
     def refuse_other_config(self, config: ExperimentConfig) -> None:

@@ -126,7 +126,7 @@ def with_archived(
         archive: `(n, genes)`, at most `capacity`.
         beaten: to add `(k, genes)`; where there is no place left, one after the other
             takes the place of a random one.
-        capacity: at most so many.
+        capacity: largest number of genomes in it.
         rng: draws those places.
     """
     free = capacity - len(archive)
@@ -138,7 +138,7 @@ def with_archived(
 
 
 def reduced_size(initial: int, evaluations: int, budget: int) -> int:
-    """Individuals after so many evaluations, from `initial` to 4: equation (10)."""
+    """Individuals after a number of evaluations, from `initial` to 4: equation (10)."""
     size = round((MIN_POPULATION - initial) / budget * evaluations + initial)
     return max(size, MIN_POPULATION)
 

@@ -26,7 +26,7 @@ IMITATION_STEPS = 10
 """Number of gradient steps in one lesson of imitation."""
 
 EVERY = 10
-"""An imitator looks at one control step of so many: neighbours are alike."""
+"""An imitator uses one of this number of control steps: neighbours are alike."""
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,7 @@ def needs(config: ExperimentConfig) -> Iterator[tuple[dict[str, int], int]]:
         yield population | {"bits": optimizer.bits} | weights, COPIES
         yield population | {"tournament": optimizer.tournament}, COPIES
     if isinstance(optimizer, LShadeParameters):
-        # it shrinks to so many
+        # its population shrinks to MIN_POPULATION
         generations = {
             f"evaluations / {MIN_POPULATION}": config.evaluations // MIN_POPULATION
         }

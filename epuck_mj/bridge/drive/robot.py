@@ -85,8 +85,8 @@ class RealRobot:
             speed_max: no wheel rolls faster than this [m/s].
             dry_run: whether it has to stand still all the time.
             start: pose `(3,)`: x, y [m], yaw [rad].
-            clock: what all times are told by; the connection's.
-            sleep: lets so many seconds go by.
+            clock: returns the time [s]; the connection's clock.
+            sleep: waits for a number of seconds.
         """
         self._connection = connection
         self._calibration = calibration

@@ -119,7 +119,7 @@ class Crew:
         )
 
     def report(self, seconds: float) -> Report | None:
-        """The next report, or None if there is none in so many seconds."""
+        """The next report, or None if none comes within a number of seconds."""
         try:
             report = self._reports.get(timeout=seconds)
         except queue.Empty:

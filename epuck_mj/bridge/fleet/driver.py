@@ -1,9 +1,9 @@
 """Driver: the process of one robot of a fleet.
 
-It is told an order on its command line. It greets the robot and waits, with the robot
-standing, for GO on standard input. The end of standard input stops it at any time: the
-fleet wants that, or its process is gone. What happens is reported on standard output,
-a line of JSON each.
+The process gets an order on its command line. It greets the robot and waits, with the
+robot standing, for GO on standard input. The end of standard input stops the drive at
+any time: either the fleet wants that, or the fleet's process has ended. The driver
+reports on standard output, one line of JSON for each event.
 """
 
 import gc

@@ -47,8 +47,8 @@ def stop_at_last(
     Args:
         connect: opens the way to it.
         seconds: how long it is tried.
-        clock: what all times are told by.
-        sleep: lets so many seconds go by.
+        clock: returns the time [s].
+        sleep: waits for a number of seconds.
     """
     until = clock() + seconds
     while clock() < until:

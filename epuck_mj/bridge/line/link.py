@@ -1,8 +1,8 @@
 """The link to a robot: requests out, replies in, on a port that may fail at any time.
 
 One request is in flight at a time, and every wait ends at a time that the caller sets.
-A link whose last request was not answered is out of step and asks nothing before it
-went through `protocol.RESYNC`.
+If the last request was not answered, the link is out of step. It then sends no request
+before `protocol.RESYNC` has succeeded.
 """
 
 import time
@@ -27,7 +27,7 @@ class Link:
     """A conversation with a robot on a serial line.
 
     Attributes:
-        clock: what all times are told by [s].
+        clock: returns the time [s].
         in_step: whether the last request was answered, and nothing else came.
     """
 
@@ -41,8 +41,8 @@ class Link:
 
         Args:
             open_port: opens it, and again if it was lost.
-            clock: what all times are told by.
-            sleep: lets so many seconds go by.
+            clock: returns the time [s].
+            sleep: waits for a number of seconds.
 
         Raises:
             UserError: if the port cannot be opened.

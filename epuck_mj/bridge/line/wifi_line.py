@@ -48,8 +48,8 @@ class WifiLine:
 
         Args:
             open_port: connects, and again if the connection was lost.
-            clock: what all times are told by.
-            sleep: lets so many seconds go by.
+            clock: returns the time [s].
+            sleep: waits for a number of seconds.
 
         Raises:
             UserError: if there is no robot.
