@@ -75,7 +75,7 @@ def evaluate_policies(argv: Sequence[str]) -> int:
     conditions = options.robots.conditions or Conditions()
     if options.json is not None:
         files.check_writable(options.json)
-    # simulators are for a command that makes sense
+    # simulators are slow to import: after the checks of the command line
     from evolution.judging.held_out import Judges, tested_on
 
     judges = Judges(options.threads)

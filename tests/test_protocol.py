@@ -264,7 +264,7 @@ def test_wrong_replies_raise(request_, came):
     found = outcome(request_, [came])
     assert isinstance(found, BridgeError)
     assert "expected" in str(found)
-    assert "came" in str(found)
+    assert "got" in str(found)
 
 
 @pytest.mark.parametrize(

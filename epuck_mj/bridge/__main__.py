@@ -101,7 +101,7 @@ def bridge(argv: Sequence[str]) -> int:
 def _drive_alone(options: Options, order: Order) -> int:
     """Drive one robot on this terminal and return the exit status."""
     wanted, show = mission(order), _show(options, order)
-    # no search for garbage among what was loaded, neither as it drives nor as it ends
+    # no garbage collection of loaded modules, neither during the drive nor at its end
     gc.freeze()
     status = drive_alone(wanted, lambda: connect(order.port), show, time.monotonic)
     if status == RUNAWAY:
@@ -115,7 +115,7 @@ def _drive_fleet(options: Options, members: Sequence[Member]) -> int:
     orders, shows = {}, {}
     for member in members:
         order = _order(options, member, folder / member.name)
-        # what is wrong with a file is known before a process is started
+        # find errors in the files before a process is started
         try:
             mission(order)
             shows[member.name] = _show(options, order)
@@ -159,7 +159,7 @@ def _show(options: Options, order: Order) -> Show:
     scene = load_scene(driver.robot, arena, driver.task.control_step)
 
     def show(name: Path, trajectory: Trajectory, summary: str) -> list[Path]:
-        # rerun and matplotlib take their time
+        # rerun and matplotlib are slow to import
         from epuck_mj.bridge.drive.pictures import save_pictures
 
         placed = options.pose is not None

@@ -131,7 +131,7 @@ def calibrate_robot(
     Raises:
         UserError: if something cannot be; the robot stands.
     """
-    # a person has work with it before it is written
+    # the measurements take time: check first that the file can be written
     check_writable(output)
     known = Calibration.load(output) if is_file(output) else Calibration()
     status, word = DONE, ""
@@ -140,7 +140,7 @@ def calibrate_robot(
         person = Person(ask, interruption)
         try:
             person.hear("The robot drives. Ctrl-C stops it and ends.")
-            # see that the robot answers before a person lays out a floor
+            # check that the robot answers before the user prepares the floor
             bench.with_robot(known, lambda robot: None)
             for step in steps:
                 known = STEPS[step](bench, person, known)
@@ -156,7 +156,7 @@ def calibrate_robot(
             status = interruption.status
             word = f"{interruption.signum.name}: ended, the robot stands still"
         if word:
-            # a question may stand there unanswered
+            # the cursor may be behind an unanswered question
             with Output(sys.stdout) as line:
                 line.say("")
             complain(word)

@@ -144,7 +144,7 @@ def look_around(
     """
 
     def job(robot: RealRobot) -> tuple[np.ndarray, np.ndarray]:
-        # a slow link makes a slow turn
+        # the slower the link, the slower the turn
         robot.begin()
         times = [robot.last.time]
         for _ in range(N_LOOKS):

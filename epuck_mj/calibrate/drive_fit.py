@@ -139,7 +139,7 @@ def fit_drive(drive: RecordedDrive, scene: Scene, known: Calibration) -> DriveFi
         model, joint = _likeliest(model, before)
         _refuse_strange(model, joint, near)
         shown = joint.errors <= ERRORS_MAX
-        # both or none: what is told apart is their sum and their difference
+        # both or none: a drive shows their sum and their difference
         shown[[LEFT, RIGHT]] = shown[LEFT] and shown[RIGHT]
         if not shown.any() and not delay.known:
             raise UserError(

@@ -92,7 +92,7 @@ def check_arena(
     path = find_arena(arena)
     checks, seen = list[Report](), list[Scene]()
     for robot in robots:
-        # in an arena that is sound, what is wrong is the robot
+        # an error in the shipped arena is an error of the robot
         load_scene(robot, "arena")
         tell(f"Checking {path.name} with {Path(robot).stem} ...")
         checks.append(_check(path, robot, seen, alone=len(robots) == 1))

@@ -184,7 +184,7 @@ def _write_at_once(stream: TextIO, text: str) -> None:
     try:
         handle = stream.fileno()
     except io.UnsupportedOperation:
-        # no file, as in notebooks
+        # not a file, as in notebooks
         stream.write(text)
         stream.flush()
         return

@@ -78,7 +78,7 @@ def _parts(
         "geom": np.flatnonzero(mine[model.geom_bodyid]),
         "site": np.flatnonzero(mine[model.site_bodyid]),
         "dof": np.flatnonzero(mine[model.dof_bodyid]),
-        # attached last
+        # the robot is attached last
         "actuator": np.arange(model.nu - alone.nu, model.nu),
         "sensor": np.arange(model.nsensor - alone.nsensor, model.nsensor),
     }

@@ -178,7 +178,7 @@ def control_step(
     wheels = command(action, task.speeds)
     reading = robot.step(wheels)
     seen = observe(reading.distance, task.sensor_range)
-    # what a step is worth is not for noisy sensors to say
+    # fitness is computed without noise
     judged, distance = seen, reading.distance
     if reading.truth is not None:
         judged, distance = observe(reading.truth, task.sensor_range), reading.truth

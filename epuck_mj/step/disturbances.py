@@ -189,7 +189,7 @@ def draw_disturbances(
     low, high = np.log(ranges.gain)
     return Disturbances(
         of=np.arange(n),
-        # a sensor that is twice as strong is as likely as one half as strong
+        # a gain of 2 is as likely as a gain of 1/2
         gains=np.exp(rng.uniform(low, high, (n, N_PROXIMITY))),
         known_gains=np.ones((n, N_PROXIMITY)),
         age=rng.uniform(0, noise.age, (n, N_PROXIMITY)),

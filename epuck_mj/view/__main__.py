@@ -81,7 +81,7 @@ def view(argv: Sequence[str]) -> int:
         task = replace(task, steps=steps)
     if options.robot == KINEMATIC_ROBOT:
         print(f"{KINEMATIC_ROBOT} is shown on wheels, as MuJoCo moves it", flush=True)
-    # physics is for a command that makes sense
+    # slow to import: after the checks of the command line
     from epuck_mj.rungs.watched_robot import WatchedRobot
     from epuck_mj.scene.model import load_scene
     from epuck_mj.view.window import open_window, watch

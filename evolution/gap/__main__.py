@@ -59,7 +59,7 @@ def measure_gap(argv: Sequence[str]) -> int:
     except UserError as problem:
         if options.robot:
             raise
-        # on wheels only, where that is possible
+        # on wheels only, if all arenas allow that
         robots = [WHEELED_ROBOT]
         check_homes(policies, robots)
         print(f"not driven on {KINEMATIC_ROBOT}: {problem}", file=sys.stderr)

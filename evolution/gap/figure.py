@@ -50,6 +50,6 @@ def kept_figure(gap: Gap, names: Mapping[str, str]) -> Figure:
                 ylim=(0, 1),
             )
         panels[0].set_ylabel("share of policies and worlds")
-        # those of one panel stand for all
+        # the lines are the same in all panels
         legend_below(figure, lines)
     return figure

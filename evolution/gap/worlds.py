@@ -105,7 +105,7 @@ def met(world: World, index: int, n: int, steps: int) -> Disturbances:
         steps: control steps of a trial.
     """
     rng = random_generator(WORLD_SEED, index)
-    # one robot in all trials: only its noise is new
+    # one robot in all trials, with new noise in each
     gains = world.curve * np.exp(world.gain_spread * rng.standard_normal(N_PROXIMITY))
     age = rng.uniform(0, PROXIMITY_PERIOD, N_PROXIMITY)
     wheels = world.wheel_radius / WHEEL_RADIUS

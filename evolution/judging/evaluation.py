@@ -169,7 +169,7 @@ class BatchEngine:
                 work.controller, work.starts, work.disturbances, race.trials, needed
             )
         if work.race is not None and work.race.trials > self._robots.capacity:
-            # an individual does not fit: none is ended early
+            # too few robots for all trials of an individual: no trial is ended early
             work = replace(work, race=None)
         parts = [
             run_trials(

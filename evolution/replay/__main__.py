@@ -28,7 +28,7 @@ def replay(argv: Sequence[str]) -> int:
             "wall-follower or a trajectory (.npz)"
         )
     conditions = options.robots.conditions
-    # physics and pictures only for a command that makes sense
+    # slow to import: after the checks of the command line
     from evolution.named_policies import named_policies
     from evolution.replay.choices import scene_for, starts_for
     from evolution.replay.output import Replay, outcome, show, text_panel

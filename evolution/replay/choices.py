@@ -126,14 +126,14 @@ def starts_for(
                 "expected --pose with x [m], y [m] and heading [degrees], got "
                 + " ".join(f"{number:g}" for number in options.pose)
             )
-        # it meets what test start 0 does
+        # it has the disturbances of test start 0
         return Starts(("pose",), _pose(scene, *options.pose)[None])
     if options.trials is not None and options.trials < 1:
         raise UserError(f"expected at least 1 trial, got {options.trials}")
     if not policies:
-        # recorded trajectories have none
+        # recorded trajectories need no starts
         return Starts((), np.zeros((0, 3)))
-    # the widest: a start that is free for one is free for all
+    # the largest clearance: a start that is free with it is free for all
     clearance = max(policy.start_clearance for policy in policies)
     if options.starts is not None:
         return numbered_starts(options.starts, scene, clearance)

@@ -66,7 +66,7 @@ def headless_viewer(recording: Path, size: tuple[int, int]) -> Iterator["ViewerC
                 *("--bind", "127.0.0.1", "--port", str(port)),
                 *("--window-size", f"{size[0]}x{size[1]}"),
             ],
-            # nothing of a person's own settings, and no calls home
+            # without the user's settings, and without analytics
             env={
                 **os.environ,
                 **{"HOME": home, "XDG_RUNTIME_DIR": home},
@@ -85,7 +85,7 @@ def headless_viewer(recording: Path, size: tuple[int, int]) -> Iterator["ViewerC
                 )
             try:
                 client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
-                # it answers before it knows whether it can paint
+                # the viewer answers before it knows whether it can draw
                 client.take_screenshot()
                 state = client.get_state()
             except Exception:  # rerun's own have no common base

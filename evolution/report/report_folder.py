@@ -79,7 +79,7 @@ def draw_figures(data: StudyData, output: Path) -> tuple[dict[str, Picture], lis
         except StopIteration:
             return found, []
         except UserError as error:
-            # the arena of another machine; all else can be shown
+            # the arena may be on another machine; everything else can be shown
             return found, [f"not all figures could be drawn: {error}"]
         write_figure(figure, folder, name)
         found[name] = Picture(name, caption, (folder / f"{name}.svg").read_bytes())

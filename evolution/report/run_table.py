@@ -124,7 +124,7 @@ def _run_row(data: StudyData, name: str, run: RunData) -> dict[str, Any]:
         for column, (value, _, _) in TEST_COLUMNS.items():
             row[f"{prefix}_{column}"] = value(test)
     row |= {column: value(run) for column, (value, _, _) in RUN_COLUMNS.items()}
-    # nan is what the champion's file does not say
+    # nan stands for values that the champion's file does not have
     return {
         column: None if isinstance(value, float) and math.isnan(value) else value
         for column, value in row.items()

@@ -104,7 +104,7 @@ def mature_by_fixed_measures(study: StudyData) -> list[Claim]:
         for (pair, where, samples, ours), adjusted in zip(
             found, p.tolist(), strict=True
         )
-        # of the two DE variants the paper says nothing
+        # the paper does not compare the two DE variants
         if pair in PAIRS
     ]
 

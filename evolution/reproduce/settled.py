@@ -128,7 +128,7 @@ def runs_needed(pair: Comparison) -> int | None:
     level = normal.inv_cdf(1 - LEVELS[0] / pair.family) + normal.inv_cdf(POWER)
     standard_error = half / normal.inv_cdf(0.5 + CONFIDENCE / 2)
     needed = max(n + 1, math.ceil(n * (level * standard_error / away) ** 2))
-    # two digits say enough
+    # rounded up to two digits
     step = 10 ** max(0, len(str(needed)) - 2)
     return math.ceil(needed / step) * step
 

@@ -145,7 +145,7 @@ def _validated(
     """Mean fitness of genomes `(k, genes)` on `n` validation starts, `(k,)`."""
     config = evolution.config
     starts = starts_for_validation(evolution.space, n)
-    # as it was evolved: robots that are disturbed alike
+    # with the disturbances of evolution
     met = held_out_disturbances(
         config.conditions, Purpose.VALIDATION, len(starts), config.steps
     )

@@ -155,7 +155,7 @@ class RunDirectory:
             files.remove_leftovers(self.path)
             if not files.is_file(self.config):
                 files.write_text(self.config, evolution.config.to_yaml())
-            # the run may have been killed between its files
+            # the run may have been killed after some of its files were written
             self._write_derived(evolution, ())
             resumed = [*first.get("resumed", ()), provenance]
             files.write_text(self.provenance, to_json({**first, "resumed": resumed}))
@@ -286,7 +286,7 @@ class RunDirectory:
         lost = {
             path.name: f"{path.name} is missing"
             for path in asked
-            # a file of no bytes is what some disks leave of one after a power cut
+            # after a power cut, some disks leave an empty file
             if not files.is_file(path) or not path.stat().st_size
         }
         for path, read in (

@@ -126,7 +126,7 @@ def _show(config: ExperimentConfig, port: int, generations: Any) -> None:
         print("The viewer was closed; the run continues", file=sys.stderr)
     except Exception:
         traceback.print_exc()
-    # rerun would wait for a viewer that has gone
+    # rerun would wait for a closed viewer
     os._exit(0)
 
 

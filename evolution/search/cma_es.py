@@ -91,7 +91,7 @@ class CmaEsParameters:
     restarts: bool = True
     learning_rate_adaptation: bool = False
     algorithm: Literal["cma_es"] = "cma_es"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -133,7 +133,7 @@ class CmaEs(Optimizer):
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Make the generation asked the current one; restart without progress."""
-        # it minimises
+        # the package minimises
         costs = (-made_finite(told)).tolist()
         self._cma.tell(list(zip(asked, costs, strict=True)))
         self._told.append(told)

@@ -120,7 +120,7 @@ class DifferentialEvolutionParameters:
     reevaluate_parents: bool = False
     reevaluate_best: int = 0
     algorithm: Literal["differential_evolution"] = "differential_evolution"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -167,7 +167,7 @@ class DifferentialEvolution(Optimizer):
         self.stores_means = parameters.reevaluate_best > 0
         self._parameters = parameters
         self._space = space
-        # evaluations that each individual has had, whose mean is stored
+        # number of evaluations of each individual; their mean is stored
         self._evaluations = np.ones(parameters.population, dtype=np.int64)
 
     def next_size(self) -> int:
@@ -250,7 +250,7 @@ class DifferentialEvolution(Optimizer):
     def arrays(self) -> dict[str, np.ndarray]:
         """See `Optimizer.arrays`."""
         arrays = super().arrays()
-        # without means it is of no use
+        # only means need it
         if self.stores_means:
             arrays["evaluations"] = self._evaluations.copy()
         return arrays

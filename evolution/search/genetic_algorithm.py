@@ -176,7 +176,7 @@ class GeneticAlgorithmParameters:
     coding: str = "binary"
     crossover_points: int = 1
     algorithm: Literal["genetic_algorithm"] = "genetic_algorithm"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -251,7 +251,7 @@ class GeneticAlgorithm(Optimizer):
     def arrays(self) -> dict[str, np.ndarray]:
         """See `Optimizer.arrays`."""
         arrays = super().arrays()
-        # of which the genomes follow
+        # genomes are decoded from them
         del arrays["population"]
         return {**arrays, "chromosomes": self._chromosomes.copy()}
 

@@ -40,7 +40,7 @@ class ImitatorsParameters:
     demonstrations: int = 20
     learning_rate: float = 0.1
     algorithm: Literal["imitators"] = "imitators"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:

@@ -170,7 +170,7 @@ class LShadeParameters:
     memory: int = 6
     budget: int = 0
     algorithm: Literal["l_shade"] = "l_shade"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -207,7 +207,7 @@ class LShade(Optimizer):
         self._archive = np.empty((0, space.genes))
         self._scales = np.full(parameters.memory, FIRST_MEMORY)
         self._crossovers = np.full(parameters.memory, FIRST_MEMORY)
-        # the pair that is written next
+        # index of the pair that is written next
         self._oldest = 0
         # F and CR of the trials that were asked last
         self._f = self._cr = np.empty(0)

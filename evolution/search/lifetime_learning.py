@@ -58,7 +58,7 @@ class LifetimeLearningParameters:
     exploration: float = 1.0
     discount: float = 0.9
     algorithm: Literal["lifetime_learning"] = "lifetime_learning"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:

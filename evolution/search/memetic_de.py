@@ -42,7 +42,7 @@ class MemeticDeParameters:
     refinements: int = 3
     sigma: float = 0.3
     algorithm: Literal["memetic_de"] = "memetic_de"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -65,7 +65,7 @@ class MemeticDe(AroundEvolution):
         refuse_wide_steps(parameters.sigma, space)
         super().__init__("memetic-de", parameters.evolution, space, rng)
         self._parameters = parameters
-        # generations of refinement to come, and who is refined
+        # generations of refinement that are left, and the individuals that are refined
         self._left = 0
         self._refined = np.zeros(len(self.population), dtype=bool)
 

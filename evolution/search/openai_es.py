@@ -88,7 +88,7 @@ class OpenAiEsParameters:
     learning_rate: float = 0.2
     weight_decay: float = 0.0
     algorithm: Literal["openai_es"] = "openai_es"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:

@@ -45,7 +45,7 @@ class PolicyGradientParameters:
     exploration: float = 1.0
     discount: float = 0.95
     algorithm: Literal["policy_gradient"] = "policy_gradient"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:

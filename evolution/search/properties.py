@@ -206,7 +206,7 @@ def _to_beat(make: Make) -> None:
         require(to_beat.shape == (len(genomes),), "not one value a genome")
         require(not np.isnan(to_beat).any(), "NaN is to beat")
         require(generation or (to_beat == -np.inf).all(), "something at first")
-        # the caller's to keep
+        # the caller may keep the array
         to_beat[:] = 99
         optimizer.tell(sphere(genomes))
     same(optimizer, evolved(make(), 4))
@@ -214,7 +214,7 @@ def _to_beat(make: Make) -> None:
 
 def _races(make: Make) -> None:
     def plateaus(genomes: np.ndarray) -> np.ndarray:
-        # many are told exactly what they have to beat
+        # many get exactly the fitness that they have to beat
         return np.round(sphere(genomes) / 4)
 
     for fitness in (sphere, plateaus):

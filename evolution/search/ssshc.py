@@ -112,7 +112,7 @@ class SsshcParameters:
     stochasticity: float = 0.1
     refinements: int = 1
     algorithm: Literal["ssshc"] = "ssshc"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -139,7 +139,7 @@ class Ssshc(Optimizer):
         super().__init__("ssshc", population, rng)
         self._parameters = parameters
         self._space = space
-        # evaluations that each parent has had, whose mean is stored
+        # number of evaluations of each parent; their mean is stored
         self._evaluations = np.zeros(parameters.population, dtype=np.int64)
 
     def next_size(self) -> int:

@@ -99,7 +99,7 @@ class StudyDirectory:
                 files.remove_leftovers(self.path)
                 asked = self.asked_seeds()
                 if not asked and files.is_file(self.config):
-                    # an older study did not say
+                    # older studies did not store it
                     begun = self.stored_config().experiments
                     asked = {n: there for n in begun if (there := self.seeds(n))}
                 for name in config.experiments:

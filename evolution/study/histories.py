@@ -115,7 +115,7 @@ def _part(experiment: str, seed: int, history: History) -> pa.Table:
         **history,
     }
     arrays = [
-        # nan is what is not known
+        # nan stands for unknown values
         pa.array(columns[field.name], from_pandas=True).cast(field.type)
         for field in SCHEMA
     ]

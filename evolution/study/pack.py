@@ -40,9 +40,9 @@ def pack_studies(argv: Sequence[str]) -> int:
         raise UserError("expected study directories")
     studies = [StudyDirectory(path) for path in options.studies]
     for study in studies:
-        # said before any work
+        # checked before any work
         study.stored_config()
-    # arrow is for a command that makes sense
+    # pyarrow is slow to import: after the checks of the command line
     from evolution.study.packing import pack
 
     left = 0

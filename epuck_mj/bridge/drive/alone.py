@@ -46,7 +46,7 @@ def drive_alone(
             outcome = accomplish(mission, connect, terminal, interruption, clock)
         finally:
             terminal.end_line()
-        # a person has to know before pictures take time; stdout may be lost
+        # tell the user before the pictures, which take time; stdout may be lost
         if outcome.status:
             complain(outcome.word)
         else:

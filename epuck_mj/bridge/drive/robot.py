@@ -129,7 +129,7 @@ class RealRobot:
             if self.met:
                 self._connection.stop()
         except StillMoving:
-            # it stood when it was met, and was told nothing else since
+            # the robot stood still when it answered, and got no other command since
             if self._driven:
                 raise
         finally:
@@ -175,7 +175,7 @@ class RealRobot:
         """
         rates = (0, 0) if self._dry_run else self.told(command)
         if rates != self._rates:
-            # unknown until it has answered
+            # unknown until the robot has answered
             self._cycle(rates, changed=True)
             self._rates = rates
         before = self._clock()

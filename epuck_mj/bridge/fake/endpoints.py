@@ -144,7 +144,7 @@ class Tcp:
         """See Pty."""
         if not self.is_open:
             return []
-        # others wait in the queue until this one has gone
+        # other connections wait in the queue until this one is closed
         return [(self._host or self._server).fileno()]
 
     def receive(self) -> bytes:

@@ -131,7 +131,7 @@ class Crew:
     def go(self) -> None:
         """Let all robots drive."""
         for process in self._processes.values():
-            # one that has ended reports that
+            # a driver that has ended has reported it
             with contextlib.suppress(OSError):
                 stdin = _pipe(process.stdin)
                 stdin.write(GO)

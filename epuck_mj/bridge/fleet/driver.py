@@ -80,14 +80,14 @@ class Reporter:
 
 def drive(argv: Sequence[str]) -> int:
     """Drive a robot as ordered and return the exit status of the bridge."""
-    # beside the drive itself, nothing ends this process before its time
+    # only the drive may end this process
     for signum in SIGNALS:
         signal.signal(signum, signal.SIG_IGN)
     order = Order.from_json(argv[0])
     with Output(sys.stdout) as output, Interruption() as interruption:
         reporter = Reporter(output)
         threading.Thread(target=reporter.listen, daemon=True).start()
-        # no search for garbage among what was loaded
+        # no garbage collection of loaded modules
         gc.freeze()
         try:
             outcome = accomplish(

@@ -99,7 +99,7 @@ class Link:
         """
         binary = request.out.endswith(b"\0")
         stale = self._rest + self._port.receive(0.0)
-        # half a banner may be in what is of no use here: `resync` looks at it again
+        # dropped bytes may hold half of a banner: `resync` looks at them again
         self._rest = stale
         if not self.in_step:
             raise BridgeError("host and robot in step", stale or "an open question")

@@ -84,7 +84,7 @@ class SerialLine:
                 if self._link.lost:
                     self._link.reopen(until)
                 elif problem is not None:
-                    # who babbles is not told without a pause
+                    # a robot that sends all the time gets commands with pauses
                     self._link.drain(again)
                 again = min(self._link.clock() + STOP_REPLY_TIME, until)
                 # at once, instead of waiting for silence as a resync does

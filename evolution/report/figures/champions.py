@@ -139,7 +139,7 @@ def rungs_figure(data: StudyData) -> tuple[Figure, str] | None:
         xlabel=f"held-out fitness, {robot_name(first)} (max {data.steps})",
         ylabel=f"held-out fitness, {robot_name(last)} (max {data.steps})",
     )
-    # as many ticks on both
+    # the same number of ticks on both axes
     axes.locator_params(nbins=4)
     legend_below(figure, lines)
     caption = (

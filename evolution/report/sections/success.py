@@ -62,7 +62,7 @@ def outcomes(data: StudyData) -> list[Outcomes]:
             }
             pairs = contests(met, data.alike, _fisher_p)
             found.append(Outcomes(criterion, robot, met, pairs))
-    # all of a criterion together
+    # sorted by criterion
     return sorted(
         found, key=lambda each: (MATCHES, FOLLOWS, KEEPS_OFF).index(each.criterion)
     )

@@ -35,7 +35,7 @@ def what_stored_fitness_promised_section(data: StudyData) -> list[Block]:
         stored, held_out = data.stored(name), like_for_like(data, name)
         tested = np.isfinite(held_out)
         believed, worth = most_believed_fitness(data, name)
-        # by run, where every run says both
+        # for each run, if every run has both
         both = held_out[tested].size == worth.size
         rows.append(
             (

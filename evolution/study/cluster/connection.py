@@ -222,7 +222,7 @@ def _greet(address: str) -> None:
 
     try:
         asyncio.run(greet())
-    # a stranger's answer can be anything
+    # another program may answer anything
     except Exception as error:
         reason = " ".join(str(error).split()) or "no answer"
         raise UserError(
