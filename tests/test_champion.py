@@ -292,7 +292,7 @@ def test_the_champion_file_holds_every_score(written):
         for robot, judge in judges_of(experiment.config).items()
     }
     assert list(tests) == ["epuck", "epuck_kinematic"]
-    # what evolution believed in most, on the robot that it climbed to
+    # the individual with the highest stored fitness, on the robot it climbed to
     genome, believed = most_believed(stored_by(experiment))
     robot = "epuck" if experiment.climbed else "epuck_kinematic"
     judge = judges_of(experiment.config)[robot]

@@ -35,8 +35,8 @@ def write_report(study: Path, output: Path, ioh: bool = False) -> tuple[str, ...
         (output / FIGURES_FOLDER).mkdir(parents=True, exist_ok=True)
         pictures, lacking = draw_figures(data, output)
         if not data.yardstick:
-            where = "not tested in the setting of all"
-            lacking.append(f"{YARDSTICK}: {where}, nothing can be compared with it")
+            where = "not tested in the setting of the runs"
+            lacking.append(f"{YARDSTICK}: {where}, so nothing can be compared with it")
         data = replace(data, missing=(*data.missing, *lacking))
         for name, text in tables(data).items():
             files.write_text(output / name, text)

@@ -38,7 +38,7 @@ class Champion:
 
     Attributes:
         genome: its weights, `(genes,)`.
-        stored_fitness: what evolution believed of it.
+        stored_fitness: what evolution stored for it.
         validation_fitness: its mean on the validation starts.
     """
 
