@@ -57,8 +57,8 @@ def what_was_run_section(data: StudyData) -> list[Block]:
         few = [label(data, name) for name, each in runs.items() if len(each) < 2]
         blocks.append(
             Paragraph(
-                f"There is only one run of {', '.join(few)}. One run does not show "
-                "the spread between runs, so there is no verdict."
+                f"Only one run of {', '.join(few)}: one run does not show the spread "
+                "between runs, so there is no verdict."
             )
         )
     blocks += [
