@@ -9,6 +9,9 @@ from pydantic import ValidationError
 
 from epuck_mj.constants import PROXIMITY_RANGE, SPEED_MAX, TURN_RATE_MAX
 from epuck_mj.errors import UserError
+from epuck_mj.policies.changes import NetworkWithChanges
+from epuck_mj.policies.follower import GENE_MAX, Follower
+from epuck_mj.step.conditions import Conditions
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import (
     CONFIGS,
@@ -119,7 +122,8 @@ ON_REAL_ROBOTS = {
     "ga-randomised": ("ga", RANDOMISED),
 }
 """The paper's again, under disturbances."""
-ALL = sorted([*SHIPPED, *ON_REAL_ROBOTS, *HYBRIDS, "policy-gradient", "best"])
+OTHERS = ["policy-gradient", "best", "robust"]
+ALL = sorted([*SHIPPED, *ON_REAL_ROBOTS, *HYBRIDS, *OTHERS])
 
 every_experiment = pytest.mark.parametrize("name", SHIPPED)
 COMMON = {
@@ -252,6 +256,19 @@ def test_derived_objects_hold_the_configs_values(name):
 
 def test_the_papers_network_has_40_weights():
     assert load_config(find_config("de-best")).search_space.genes == 40
+
+
+def test_networks_that_are_not_the_papers():
+    config = load_config(find_config("robust"))
+    assert config.topology == Follower()
+    assert config.search_space.genes == 13
+    # its genes mean nothing beyond
+    assert config.weight_bound == GENE_MAX
+    assert config.conditions == Conditions("calibrated", True)
+    update = {"network": "feedforward_changes", "hidden": 2, "biases": True}
+    changes = config.model_copy(update=update).topology
+    assert changes == NetworkWithChanges(2, True)
+    assert changes.n_genes == (2 * 8 + 1) * 2 + (2 + 1) * 2
 
 
 @every_experiment

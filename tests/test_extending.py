@@ -283,7 +283,10 @@ class Needy:
         ("--fitness bad.py:much", "expected at most its maximum, 1, got 3"),
         ("--fitness broken.py:f", "'.*broken.py' failed in line 2 with SyntaxError"),
         ("--fitness late.py:f", "'.*late.py' failed in line 1 with ZeroDivisionError"),
-        ("--network elman", "expected feedforward or my.py:name, got 'elman'"),
+        (
+            "--network elman",
+            "expected feedforward, feedforward_changes, follower or my.py:name",
+        ),
         ("--network bad.py:Loud", "expected v from 0 to 1 and w from -1 to 1, got v 3"),
         ("--network bad.py:Flat", r"expected actions of shape \(20, 2\), got \(2,\)"),
         ("--network bad.py:Deaf", "expected a method 'act'"),

@@ -37,6 +37,7 @@ from epuck_mj.constants import (
 )
 from epuck_mj.errors import UserError
 from epuck_mj.policies.network import Network
+from epuck_mj.policies.topology import NETWORKS
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.table import RUNGS
 from epuck_mj.scene.model import load_scene
@@ -407,6 +408,23 @@ def test_trajectory_of_a_session(kinematic):
     np.testing.assert_allclose(rates, rates.round(), atol=1e-9)
     expected = FORMULAS[TASK.fitness](trajectory.action, trajectory.observation[1:])
     np.testing.assert_array_equal(trajectory.fitness, expected)
+
+
+@pytest.mark.parametrize("name", ["feedforward_changes", "follower"])
+def test_a_robot_remembers_from_the_start_of_its_drive_on(kinematic, name):
+    topology = NETWORKS[name](4, False)
+    genome = np.random.default_rng(1).uniform(-5, 5, topology.n_genes)
+    policy = topology.decode(genome)
+    # what it saw elsewhere is forgotten
+    policy(np.zeros(8))
+    world = World(kinematic, AT_WALL)
+    world.drive(25, policy)
+    trajectory = world.session.trajectory(policy)
+    assert trajectory is not None
+    fresh = topology.decode(genome)
+    actions = [fresh(seen) for seen in trajectory.observation[:-1]]
+    np.testing.assert_array_equal(trajectory.action, actions)
+    assert trajectory.hidden.shape == (25, 0 if name == "follower" else 4)
 
 
 def test_a_session_that_read_nothing():

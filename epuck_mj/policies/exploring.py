@@ -27,7 +27,7 @@ class Exploring:
     def __call__(self, observation: np.ndarray) -> np.ndarray:
         """Actions `(n, 2)` for observations `(n, 8)`, one control step after another.
 
-        Those of `rungs.kinematic.fused.act`, to the bit.
+        Those of `rungs.kinematic.drivers.act`, to the bit.
         """
         tried = self._tried[:, self._k]
         self._k += 1

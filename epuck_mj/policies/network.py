@@ -65,8 +65,7 @@ class Network:
     @property
     def n_genes(self) -> int:
         """Number of weights: 40 for the paper's 8-4-2 without biases."""
-        bias = int(self.biases)
-        return (N_PROXIMITY + bias) * self.hidden + (self.hidden + bias) * N_ACTIONS
+        return n_weights(N_PROXIMITY, self.hidden, self.biases)
 
     def decode(self, genomes: np.ndarray) -> "Controller":
         """The controllers of genomes `(..., genes)`.
@@ -78,15 +77,7 @@ class Network:
             ValueError: if the genomes have another length.
         """
         genomes = genomes_of(genomes, self.n_genes, str(self))
-        n_in = N_PROXIMITY + self.biases
-        batch = genomes.shape[:-1]
-        hidden, output = np.split(genomes, [n_in * self.hidden], axis=-1)
-        hidden = hidden.reshape(*batch, self.hidden, n_in)
-        output = output.reshape(*batch, N_ACTIONS, self.hidden + self.biases)
-        return Controller(
-            np.ascontiguousarray(np.moveaxis(hidden, -1, 0)),
-            np.ascontiguousarray(np.moveaxis(output, -1, 0)),
-        )
+        return controllers_of(genomes, N_PROXIMITY, self.hidden, self.biases)
 
 
 @dataclass(frozen=True)
@@ -123,6 +114,25 @@ class Controller:
     def __getitem__(self, index: Any) -> "Controller":
         """The controllers at `index` of the batch, in numpy's sense."""
         return Controller(self.hidden[:, index], self.output[:, index])
+
+
+def n_weights(inputs: int, hidden: int, biases: bool) -> int:
+    """Number of weights of a network with so many inputs and hidden neurons."""
+    return (inputs + biases) * hidden + (hidden + biases) * N_ACTIONS
+
+
+def controllers_of(
+    genomes: np.ndarray, inputs: int, hidden: int, biases: bool
+) -> Controller:
+    """The controllers of genomes `(..., genes)`; see `Network.decode`."""
+    n_in, batch = inputs + biases, genomes.shape[:-1]
+    into, out = np.split(genomes, [n_in * hidden], axis=-1)
+    into = into.reshape(*batch, hidden, n_in)
+    out = out.reshape(*batch, N_ACTIONS, hidden + biases)
+    return Controller(
+        np.ascontiguousarray(np.moveaxis(into, -1, 0)),
+        np.ascontiguousarray(np.moveaxis(out, -1, 0)),
+    )
 
 
 def squashed(sums: np.ndarray) -> np.ndarray:

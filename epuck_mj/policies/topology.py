@@ -1,4 +1,4 @@
-"""What genomes decode to: the paper's network, or one of a user's own.
+"""What genomes decode to: the paper's network, others that are shipped, or a user's.
 
 A user's network is a class without arguments, `my.py:Name`, with
 
@@ -12,7 +12,7 @@ same alone and among others, so sums are to be written out: a matrix product add
 order that depends on how many robots there are.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol, Self
@@ -23,6 +23,8 @@ from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
 from epuck_mj.host.limits import check
 from epuck_mj.host.own_parts import failure, own_part
+from epuck_mj.policies.changes import NetworkWithChanges
+from epuck_mj.policies.follower import Follower
 from epuck_mj.policies.network import N_ACTIONS, Network, genomes_of
 from epuck_mj.step.control import BatchPolicy
 
@@ -150,6 +152,17 @@ class OwnController:
         return type(self)(self._own, genomes, np.zeros((*robots, n_state)))
 
 
+FEEDFORWARD = "feedforward"
+"""Name of the paper's network."""
+
+NETWORKS: Mapping[str, Callable[[int, bool], Topology]] = {
+    FEEDFORWARD: Network,
+    "feedforward_changes": NetworkWithChanges,
+    "follower": lambda hidden, biases: Follower(),
+}
+"""Makers of shipped topologies by name, from hidden neurons and biases."""
+
+
 def topology_from(fields: Mapping[str, Any]) -> Topology:
     """The topology that `to_dict` described; a user's code is not loaded yet.
 
@@ -161,6 +174,15 @@ def topology_from(fields: Mapping[str, Any]) -> Topology:
         if not isinstance(fields["own"], str) or len(fields) > 1:
             raise ValueError(f"expected the name of a network, got {fields['own']!r}")
         return OwnNetwork(fields["own"])
+    if "follower" in fields:
+        if fields != Follower().to_dict():
+            raise ValueError(
+                "expected the numbers of a follower and their ranges as in this version"
+            )
+        return Follower()
+    if fields.get("changes") is True:
+        rest = {key: value for key, value in fields.items() if key != "changes"}
+        return NetworkWithChanges(**rest)
     return Network(**fields)
 
 

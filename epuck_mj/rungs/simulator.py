@@ -4,6 +4,7 @@ from typing import Protocol
 
 import numpy as np
 
+from epuck_mj.policies.changes import WithChanges
 from epuck_mj.policies.network import Controller
 from epuck_mj.step.control import Robots, Trials
 from epuck_mj.step.disturbances import Disturbances
@@ -43,7 +44,7 @@ class CompiledTrials(Protocol):
 
     def __call__(
         self,
-        controller: Controller,
+        controller: Controller | WithChanges,
         starts: np.ndarray,
         disturbances: Disturbances | None,
         per_individual: int,

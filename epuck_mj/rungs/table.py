@@ -41,7 +41,7 @@ def robots_in(scene: Scene, capacity: int, threads: int = 0) -> Simulator:
 def compiled_trials(
     scene: Scene, task: TaskParameters, threads: int = 0, late: int = 0
 ) -> CompiledTrials | None:
-    """Whole trials of the paper's network in compiled code, with the same bits.
+    """Whole trials of shipped networks in compiled code, with the same bits.
 
     None where there are none: on other rungs, and for a user's own step fitness.
 

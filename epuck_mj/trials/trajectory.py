@@ -12,6 +12,7 @@ import numpy as np
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import read_arrays, write_arrays, writing
+from epuck_mj.policies.changes import WithChanges
 from epuck_mj.policies.network import Controller
 from epuck_mj.step.control import Policy
 
@@ -137,7 +138,7 @@ def hidden_outputs(policy: Policy, observations: np.ndarray) -> np.ndarray:
         policy: that saw the observations, one after the other.
         observations: `(T, 8)`.
     """
-    if isinstance(policy, Controller):
+    if isinstance(policy, Controller | WithChanges):
         # the same bits, alone or among other robots
         return policy.activation(observations)
     return np.zeros((len(observations), 0))

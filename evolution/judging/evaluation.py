@@ -15,6 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
+from epuck_mj.policies.changes import WithChanges
 from epuck_mj.policies.network import Controller
 from epuck_mj.policies.topology import Topology
 from epuck_mj.rungs.disturbed import disturbed
@@ -162,7 +163,9 @@ class BatchEngine:
 
     def run(self, work: Work) -> Trials:
         """See `Engine.run`."""
-        if self._compiled is not None and isinstance(work.controller, Controller):
+        if self._compiled is not None and isinstance(
+            work.controller, Controller | WithChanges
+        ):
             race = work.race or Race(np.full(len(work), -np.inf), 1)
             needed = (race.to_beat - ROUNDING) * race.trials
             return self._compiled(

@@ -93,7 +93,7 @@ class GivenLessons:
             trials: of an evaluation.
 
         Raises:
-            UserError: if it is a user's network, of which there are no gradients.
+            UserError: as `learnable`.
         """
         self.network = learnable(topology)
         self.cost = self.control_steps = 0
@@ -136,7 +136,7 @@ def learnable(topology: Topology) -> Network:
     """The network, if it is one that can be given lessons.
 
     Raises:
-        UserError: if it is a user's, of which there are no gradients.
+        UserError: if it is another one, of which there are no gradients.
     """
     if not isinstance(topology, Network):
         raise UserError(

@@ -35,6 +35,7 @@ LABELS: Mapping[str, str] = {
     "de-best-calibrated": "DE/best/1/bin, calibrated",
     "de-best-randomised": "DE/best/1/bin, randomised",
     "ga-randomised": "GA, randomised",
+    "robust": "robust: a follower by rule, randomised",
 }
 """Names of shipped experiments; any other is called as its user calls it."""
 

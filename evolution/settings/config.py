@@ -19,15 +19,13 @@ from epuck_mj.host.command_line import word
 from epuck_mj.host.limits import shown
 from epuck_mj.host.own_parts import is_own, located, own_part
 from epuck_mj.host.yaml_and_json import parse_yaml, to_yaml
-from epuck_mj.policies.network import Network
-from epuck_mj.policies.topology import OwnNetwork, Topology
+from epuck_mj.policies.topology import FEEDFORWARD, NETWORKS, OwnNetwork, Topology
 from epuck_mj.scene.model_files import KINEMATIC_ROBOT, absolute
 from epuck_mj.step.conditions import Conditions, NoiseLevel
 from epuck_mj.step.control import START_CLEARANCE, TaskParameters
 from evolution.search.table import SearchSpace, own_parameters
 from evolution.settings.config_errors import one_line
 from evolution.settings.config_fields import (
-    FEEDFORWARD,
     N_TEST,
     N_VALIDATION,
     CalibrationConfig,
@@ -125,7 +123,9 @@ class ExperimentConfig(BaseModel):
     network: NetworkName = Field(
         FEEDFORWARD,
         description="feedforward (the paper's, with the hidden neurons and biases "
-        "below) or my.py:Class (a network of your own)",
+        "below), feedforward_changes (which also sees how each reading has changed "
+        "since the last control step), follower (a wall follower by rule, of 13 "
+        "numbers) or my.py:Class (a network of your own)",
     )
     hidden: Annotated[int, within("hidden")] = Field(
         4, description="number of hidden neurons"
@@ -196,8 +196,8 @@ class ExperimentConfig(BaseModel):
     @property
     def topology(self) -> Topology:
         """Topology of the networks that genomes decode to."""
-        if self.network == FEEDFORWARD:
-            return Network(self.hidden, self.biases)
+        if self.network in NETWORKS:
+            return NETWORKS[self.network](self.hidden, self.biases)
         return OwnNetwork(self.network)
 
     @property

@@ -19,6 +19,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import word
 from epuck_mj.host.limits import LIMITS, shown
 from epuck_mj.host.own_parts import is_own
+from epuck_mj.policies.topology import NETWORKS
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.fitness import FORMULAS
 from evolution.search.table import ALGORITHMS, OptimizerParameters
@@ -29,9 +30,6 @@ N_VALIDATION = 200
 
 N_TEST = 1000
 """Default number of starts on which a champion is tested."""
-
-FEEDFORWARD = "feedforward"
-"""Name of the paper's network, with the configuration's hidden neurons and biases."""
 
 
 def within(name: str) -> BeforeValidator:
@@ -59,7 +57,7 @@ def _one_of(*shipped: str) -> AfterValidator:
 
 FitnessName = Annotated[str, _one_of(*FORMULAS), word("FITNESS")]
 
-NetworkName = Annotated[str, _one_of(FEEDFORWARD), word("NETWORK")]
+NetworkName = Annotated[str, _one_of(*NETWORKS), word("NETWORK")]
 
 
 def _of_known_algorithm(value: Any) -> Any:

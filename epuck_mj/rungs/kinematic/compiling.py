@@ -25,6 +25,7 @@ _PACKAGE = Path(__file__).resolve().parents[2]
 SOURCES = [
     *sorted(Path(__file__).parent.glob("*.py")),
     *sorted((_PACKAGE / "step").glob("*.py")),
+    _PACKAGE / "policies" / "follower.py",
     _PACKAGE / "constants.py",
 ]
 """Files whose functions and constants are compiled."""

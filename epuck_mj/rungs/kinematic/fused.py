@@ -1,4 +1,4 @@
-"""Whole trials of the paper's network on kinematic robots, in compiled code.
+"""Whole trials of shipped policies on kinematic robots, in compiled code.
 
 The same operations in the same order as `control.run_trials` with `KinematicRobots`,
 so with the same bits, one trial after the other.
@@ -20,16 +20,17 @@ from epuck_mj.constants import (
     WHEEL_RADIUS,
     WHEEL_SPEED_MAX,
 )
+from epuck_mj.policies.changes import WithChanges
 from epuck_mj.policies.network import Controller
 from epuck_mj.rungs.bodies import SPARE_SPEED
 from epuck_mj.rungs.kinematic.compiling import compiled
+from epuck_mj.rungs.kinematic.drivers import Drivers, decide, drivers_of, notice
 from epuck_mj.rungs.kinematic.kernel import (
     COS,
     SIN,
     X,
     Y,
     exp,
-    half_tanh,
     move,
     sense,
 )
@@ -170,28 +171,6 @@ def motor(wheel):
 
 
 @compiled(forceinline=True)
-def act(hidden, output, trial, observation, neurons, more_v, more_w):
-    """Action v, w of the network of a trial; see `exploring.Exploring`."""
-    n_in, n_hidden = observation.shape[0], neurons.shape[0]
-    for j in range(n_hidden):
-        total = observation[0] * hidden[0, trial, j]
-        for i in range(1, n_in):
-            total += observation[i] * hidden[i, trial, j]
-        if hidden.shape[0] > n_in:
-            total += hidden[n_in, trial, j]
-        neurons[j] = (half_tanh(total) + 1.0) * 0.5
-    v = neurons[0] * output[0, trial, 0]
-    w = neurons[0] * output[0, trial, 1]
-    for j in range(1, n_hidden):
-        v += neurons[j] * output[j, trial, 0]
-        w += neurons[j] * output[j, trial, 1]
-    if output.shape[0] > n_hidden:
-        v += output[n_hidden, trial, 0]
-        w += output[n_hidden, trial, 1]
-    return (half_tanh(v + more_v) + 1.0) * 0.5, half_tanh(w + more_w)
-
-
-@compiled(forceinline=True)
 def observe(distance, sensor_range, observation):
     """See `sensors.observe`; fills `(8,)`, the least of them."""
     least = 1.0
@@ -209,8 +188,7 @@ def trial(
     noise: Noise,
     exploration: Exploration,
     which,
-    hidden,
-    output,
+    drivers: Drivers,
     i,
     states,
     lag,
@@ -224,16 +202,17 @@ def trial(
         noise: disturbances.
         exploration: of learners.
         which: of the disturbances the trial meets.
-        hidden: weights of all trials' networks, as in `Controller`.
-        output: likewise.
+        drivers: policies of all trials.
         i: number of the trial among these.
         states: of all robots on their starts, `(n, N_STATE)`; changed.
         lag: of their wheels, `(n, 4)`.
         needed: fitness that it has to reach to matter; the trial ends when it cannot.
     """
     truth, before = np.empty(N_PROXIMITY), np.empty(N_PROXIMITY)
-    distance, observation = np.empty(N_PROXIMITY), np.empty(N_PROXIMITY)
-    neurons = np.empty(hidden.shape[2])
+    distance, last = np.empty(N_PROXIMITY), np.empty(N_PROXIMITY)
+    # of some policies, the changes of the readings come behind them
+    observation = np.empty(drivers.inputs)
+    neurons = np.empty(drivers.hidden.shape[2])
     delay = noise.latency[which] if noise.there else task.late
     sent = np.zeros((delay + 1, 2))
     body, rays = plan.body, plan.rays
@@ -272,7 +251,8 @@ def trial(
             more_v, more_w = exploration.tried[i, k, 0], exploration.tried[i, k, 1]
             for j in range(N_PROXIMITY):
                 exploration.observation[i, k, j] = observation[j]
-        v, w = act(hidden, output, i, observation, neurons, more_v, more_w)
+        notice(observation, last, k)
+        v, w = decide(drivers, i, observation, neurons, more_v, more_w)
         forward, turn = v * task.forward, w * task.turn
         left = min(max(forward + turn, -task.speed_max), task.speed_max)
         right = min(max(forward - turn, -task.speed_max), task.speed_max)
@@ -358,8 +338,7 @@ def trials(
     noise: Noise,
     exploration: Exploration,
     of,
-    hidden,
-    output,
+    drivers: Drivers,
     states,
     lag,
     first,
@@ -378,8 +357,7 @@ def trials(
         noise: disturbances.
         exploration: of learners.
         of: which of the disturbances each trial meets, `(n,)`.
-        hidden: weights of all trials' networks, as in `Controller`.
-        output: likewise.
+        drivers: policies of all trials.
         states: of the robots on their starts, `(n, N_STATE)`; changed.
         lag: of their wheels, `(n, 4)`.
         first: individual.
@@ -403,8 +381,7 @@ def trials(
                 noise,
                 exploration,
                 of[i],
-                hidden,
-                output,
+                drivers,
                 i,
                 states,
                 lag,
@@ -435,7 +412,7 @@ class FusedTrials:
 
     def __call__(
         self,
-        controller: Controller,
+        controller: Controller | WithChanges,
         starts: np.ndarray,
         disturbances: Disturbances | None,
         per_individual: int,
@@ -451,7 +428,7 @@ class FusedTrials:
 
     def explored(
         self,
-        controller: Controller,
+        controller: Controller | WithChanges,
         starts: np.ndarray,
         disturbances: Disturbances | None,
         tried: np.ndarray,
@@ -470,13 +447,14 @@ class FusedTrials:
 
     def _run(
         self,
-        controller: Controller,
+        controller: Controller | WithChanges,
         starts: np.ndarray,
         disturbances: Disturbances | None,
         per_individual: int,
         to_beat: np.ndarray,
         exploration: Exploration,
     ) -> Trials:
+        drivers = drivers_of(controller)
         n, time = len(starts), self._task.control_step
         noise, of = _noise(disturbances, n, time)
         reach = self._task.sensor_range
@@ -497,8 +475,7 @@ class FusedTrials:
                 noise,
                 exploration,
                 of,
-                controller.hidden,
-                controller.output,
+                drivers,
                 states,
                 lag,
                 *part,
