@@ -3,6 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 RUN := runs/de-best-seed-1
+LESSON := runs/lesson
 # without the notice of mkdocs-material
 MKDOCS := NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs
 CHAMPION := results/paper/de-best/seed-1
@@ -65,25 +66,31 @@ ppo: $(INSTALLED)
 	  --json results/ppo/test.json
 	$(BIN)/python -m benchmarks.ppo.figure
 
-# champions of three seeds of each experiment in other worlds, kinematic and on wheels
+# champions of three seeds of each experiment in other worlds, kinematic and on wheels;
+# fast ones are also driven slower
 gap: $(INSTALLED)
 	$(BIN)/python -m evolution.gap \
 	  $(foreach seed,1 2 3,$(PAPERS:%=results/paper/%/seed-$(seed))) \
-	  results/transfer wall-follower --output results/gap
+	  results/transfer wall-follower --speeds 0.04 0.08 --output results/gap
 
 # what git keeps of the studies in runs/, and everything that is made of it
 results: $(INSTALLED)
 	$(BIN)/python -m evolution.reproduce.publish
 
 # all pictures; the first needs EGL or OSMesa, the second a Vulkan driver
-figures: $(INSTALLED) run
+figures: $(INSTALLED) $(LESSON)
 	$(BIN)/python -m evolution.replay $(CHAMPION) --starts test:0 \
 	  --image docs/champion.png
-	$(BIN)/python -m evolution.replay $(RUN) --generations 0,10,50,last \
-	  --starts test:0 --save runs/generations.rrd
+	$(BIN)/python -m evolution.replay $(LESSON) --generations 0,10,50,last \
+	  --starts test:3 --save runs/generations.rrd
 	$(BIN)/python -m evolution.replay.viewer_picture runs/generations.rrd \
-	  --output docs/replay.png --size 1400 875
+	  --output docs/replay.png
 	$(BIN)/python -m evolution.report results/paper --output results/report-paper
+
+# the run of docs/lesson.md
+$(LESSON): | $(INSTALLED)
+	$(BIN)/python -m evolution.run de-best --climb 1 --validation-starts 50 \
+	  --test-starts 100 --output $(LESSON)
 
 $(INSTALLED): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv

@@ -8,8 +8,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
+import pytest
+
 PATIENCE = 600.0
 """Whatever takes longer [s] hangs, on however slow and busy a machine."""
+
+
+def forget(patch: pytest.MonkeyPatch, module: str) -> None:
+    """Let a command's module be run in this process as in a fresh one."""
+    for name in (module, f"{module}.__main__"):
+        file = sys.modules.get(name)
+        if file is not None and not hasattr(file, "__path__"):
+            patch.delitem(sys.modules, name)
 
 
 @contextmanager

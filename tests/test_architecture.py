@@ -35,9 +35,8 @@ ROOMS = {
         {"study"},
         {"margins", "named_policies", "pages"},
         {"evaluate", "export", "frames", "gap", "replay", "report", "verify"},
-        {"hybrids"},
+        {"hybrids", "variations"},
         {"reproduce"},
-        {"variations"},
         {"__main__"},
     ],
 }
@@ -89,6 +88,7 @@ ALLOWED_IN = {
         "evolution/study/columns.py",
         "evolution/study/histories.py",
         "evolution/study/table_files.py",
+        "evolution/study/thinning.py",
     ),
     "rerun": ("epuck_mj/show/recording/", "evolution/replay/viewer_picture.py"),
     "serial": ("epuck_mj/bridge/line/serial_port.py",),

@@ -163,6 +163,7 @@ FLAGS = {
         "resume": NAME,
         "unknown": "3",
         "randomise": "",
+        "randomise-all": "",
     },
     "study study.yaml --output out": {
         "jobs": WHOLE,
@@ -177,6 +178,7 @@ FLAGS = {
         "generations": "x,99,-1",
         "json": "no/such.json,.",
         "randomise": "",
+        "randomise-all": "",
     },
     f"{SHOW} champion.json": {
         "trials": "51," + SIZE,
@@ -189,6 +191,7 @@ FLAGS = {
         **dict.fromkeys(("worlds", "starts"), "1," + SIZE),
         "threads": WHOLE,
         "robot": NAME,
+        "speeds": "0,-1,inf,0.2,x,nan,1e999",
     },
     "view arena champion.json": {
         "seed": WHOLE,

@@ -31,13 +31,12 @@ from evolution.reproduce.verdicts import (
     OTHER_STUDY,
     TOO_FEW,
     UNDECIDED,
-    chance_of_best,
-    chance_of_order,
     fewest_to_contradict,
     of_best,
     of_most,
 )
 from evolution.settings.config_files import find_config, load_config
+from evolution.statistics.best_of_few import chance_of_best, chance_of_order
 from evolution.study.data import RunData, StudyData
 
 NAMES = ("de-best", "de-rand", "ga")

@@ -8,18 +8,16 @@ from epuck_mj.__main__ import COMMANDS as ROBOT_COMMANDS
 from epuck_mj.__main__ import listing
 from epuck_mj.errors import UserError
 from evolution.__main__ import COMMANDS, script
+from evolution.export import export
 from evolution.run.__main__ import evolve
+from tests.processes import forget
 
 ALL = COMMANDS | ROBOT_COMMANDS
 
 
 @pytest.mark.parametrize("module", ALL)
 def test_help_ends_with_examples_in_words(module, capsys, monkeypatch, handlers):
-    # as in a fresh process
-    for name in (module, f"{module}.__main__"):
-        file = sys.modules.get(name)
-        if file is not None and not hasattr(file, "__path__"):
-            monkeypatch.delitem(sys.modules, name)
+    forget(monkeypatch, module)
     monkeypatch.setattr(sys, "argv", ["epuck-mj", module.rpartition(".")[2], "--help"])
     with pytest.raises(SystemExit) as end:
         script()
@@ -78,3 +76,13 @@ def test_a_mistake_is_answered_with_what_to_do(flags, message):
     with pytest.raises(UserError) as caught:
         evolve(["ga", *flags.split(), "--print-config"])
     assert str(caught.value).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"), [([], "RUN, FILE"), (["runs/ga-seed-1"], "FILE")]
+)
+def test_what_is_missing_is_named(arguments, names):
+    with pytest.raises(UserError) as caught:
+        export(arguments)
+    expected = f"expected {names}, got none; see python -m evolution.export --help"
+    assert str(caught.value) == expected

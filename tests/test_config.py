@@ -143,6 +143,7 @@ COMMON = {
     "sensor_range": 0.04,
     "noise": "none",
     "randomise": False,
+    "randomise_all": False,
     "calibration": None,
     "start_clearance": 0.01,
     "body_margin": 0.0,

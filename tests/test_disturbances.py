@@ -6,17 +6,21 @@ import json
 import numpy as np
 import pytest
 
-from epuck_mj.constants import STEP_RATE_MAX, TRACK, WHEEL_RADIUS
+from epuck_mj.constants import BODY_RADIUS, STEP_RATE_MAX, TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.policies.network import Network
 from epuck_mj.rungs.disturbed import DisturbedRobots
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.rungs.table import RUNGS, robots_in
+from epuck_mj.rungs.watched_robot import WatchedRobot
+from epuck_mj.scene.changed_robots import with_body_radius, with_sensors_set_back
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.robot_parts import ROBOT_BODY
+from epuck_mj.step.bodies import Bodies
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.disturbances import (
+    ALL_RANGES,
     BOOK,
     NOISE,
     RANGES,
@@ -24,6 +28,7 @@ from epuck_mj.step.disturbances import (
     Noise,
     draw_calibrated,
     draw_disturbances,
+    with_slipping_start,
 )
 from epuck_mj.step.motors import STEP_ANGLE, wheel_speeds
 from epuck_mj.step.sensors import proximity
@@ -92,7 +97,7 @@ def test_draws_stay_in_their_ranges_and_come_from_their_seed():
         again, other = drawn(3000), drawn(3000, seed=1)
         value = getattr(many, field.name)
         np.testing.assert_array_equal(getattr(again, field.name), value)
-        same = field.name in ("of", "known_gains", "lag")
+        same = field.name in ("of", "known_gains", "lag", "wider", "set_back")
         assert same or (getattr(other, field.name) != value).any()
 
 
@@ -100,7 +105,51 @@ def test_the_book_has_one_robot():
     found = drawn(5, ranges=BOOK)
     for name in ("gains", "wheel_gains", "turn_gain", "mass", "friction"):
         np.testing.assert_allclose(getattr(found, name), 1, rtol=1e-12)
-    assert not found.latency.any()
+    assert not any(each.any() for each in (found.latency, found.wider, found.set_back))
+
+
+def test_robots_that_differ_in_everything():
+    """Beyond the ranges of randomised robots, whose draws stay as they are."""
+    some, every = drawn(3000), drawn(3000, ranges=ALL_RANGES)
+    for name in ("age", "count_noise", "turn_gain", "latency", "mass", "friction"):
+        np.testing.assert_array_equal(getattr(every, name), getattr(some, name))
+    radius = BODY_RADIUS + every.wider
+    light = (every.gains / some.gains)[:, 0]
+    battery = (every.wheel_gains / some.wheel_gains)[:, 0]
+    for values, (low, high) in (
+        (radius, ALL_RANGES.body_radius),
+        (every.set_back, ALL_RANGES.set_back),
+        (light, ALL_RANGES.light),
+        (battery, ALL_RANGES.battery),
+    ):
+        tenth = 0.1 * (high - low)
+        assert low - 1e-12 <= values.min() < low + tenth
+        assert high - tenth < values.max() <= high + 1e-12
+    # one light for all sensors, one battery for both wheels
+    np.testing.assert_allclose(every.gains / some.gains, np.tile(light, (8, 1)).T)
+    np.testing.assert_allclose(
+        every.wheel_gains[:, 1] / some.wheel_gains[:, 1], battery
+    )
+    less = (1 + every.wheel_noise) / (1 + some.wheel_noise)
+    slips = less[..., 0] < 1 - 1e-9
+    most = ALL_RANGES.slipping[1]
+    assert set(slips.sum(axis=1)) == set(range(most + 1))
+    for late, slipping, grip in zip(some.latency, slips, less, strict=True):
+        n = slipping.sum()
+        np.testing.assert_array_equal(np.flatnonzero(slipping), late + np.arange(n))
+        np.testing.assert_allclose(grip[slipping], grip[late, 0])
+
+
+def test_a_start_that_slips_is_a_slower_one(scene):
+    """One step late, two steps with a half of the speed, then all of it."""
+    late, slipping = np.array([1]), np.array([2])
+    noise = with_slipping_start(
+        np.zeros((1, STEPS, 2)), late, slipping, np.array([0.5])
+    )
+    met = drawn(1, QUIET, BOOK, latency=late, wheel_noise=noise)
+    way = np.diff(driven(scene, STARTS[:1], met, FULL, 6)[:, 0, :2], axis=0)
+    whole, *steps = (np.linalg.norm(way, axis=1)[[-1, 0, 2, 4]]).tolist()
+    np.testing.assert_allclose(np.array(steps) / whole, [0, 0.5, 1], atol=0.02)
 
 
 def test_arrays_that_do_not_belong_together_are_refused():
@@ -175,7 +224,9 @@ def test_readings_have_an_age(scene):
 def test_bodies_are_heavier_and_slide():
     scene = load_scene("epuck", "arena", TASK.control_step)
     robots = MujocoRobots(scene, 2, 1)
-    robots.embody(np.array([1.0, 2.0]), np.array([1.0, 0.5]), np.array([1.0, 2.0]))
+    two = np.array([1.0, 2.0])
+    own, half = Bodies.own(2), np.array([1.0, 0.5])
+    robots.embody(dataclasses.replace(own, mass=two, friction=half, lag=two))
     model = scene.model
     body, wheel = model.body(ROBOT_BODY).id, model.geom("epuck/wheel_left").id
     mass, friction = (
@@ -188,15 +239,75 @@ def test_bodies_are_heavier_and_slide():
     gain = robots._batch.expand("actuator_gainprm")
     np.testing.assert_allclose(gain[1], model.actuator_gainprm / 2)
     # and the next robots have their own again
-    robots.embody(*np.ones((3, 2)))
+    robots.embody(own)
     np.testing.assert_array_equal(mass, [model.body_mass] * 2)
     np.testing.assert_array_equal(gain, [model.actuator_gainprm] * 2)
+
+
+SHAPES = {"wider": [0.002, -0.001, 0.0], "set_back": [0.0, 0.002, 0.001]}
+
+
+def shaped():
+    wider, set_back = (np.array(each) for each in SHAPES.values())
+    return drawn(3, QUIET, BOOK, wider=wider, set_back=set_back)
+
+
+def test_readings_are_from_where_the_sensors_are(scene):
+    """As those of a robot that is so in its MJCF; and of the next ideal ones."""
+    robots = robots_in(scene, 3, 1)
+    met = DisturbedRobots(robots, shaped(), TASK.control_step)
+    found, clearance = met.reset(STARTS), met.clearances()
+    for i, (wider, back) in enumerate(zip(*SHAPES.values(), strict=True)):
+        other = with_body_radius(scene, BODY_RADIUS + wider)
+        other = with_sensors_set_back(other, back - wider)
+        one = robots_in(other, 1, 1)
+        expected = one.reset(STARTS[i : i + 1])
+        assert found.truth is not None
+        np.testing.assert_allclose(found.truth[i], expected.distance[0], atol=1e-12)
+        np.testing.assert_allclose(clearance[i], one.clearances()[0], atol=1e-9)
+    robots.disembody()
+    ideal = robots.reset(STARTS).distance
+    np.testing.assert_array_equal(ideal, robots_in(scene, 3, 1).reset(STARTS).distance)
+    assert (np.abs(ideal - found.truth) > 5e-4).any()
+
+
+def test_a_wider_body_touches_sooner(scene):
+    """With 1.5 mm from the shell to a wall, one of 2 mm more is a crash."""
+    beside = np.tile([0.5 - BODY_RADIUS - 0.0015, 0.0, np.pi / 2], (3, 1))
+    robots = robots_on(scene, beside, shaped())
+    robots.reset(beside)
+    reading = robots.step(np.zeros((3, 2)))
+    np.testing.assert_array_equal(reading.contact, [True, False, False])
+
+
+def test_nothing_of_the_robot_is_seen_by_its_own_sensors(tmp_path):
+    """However far they are set back: MuJoCo's rays meet wheels."""
+    floor = '<geom type="plane" size="2 2 1"/>'
+    arena = tmp_path / "nothing.xml"
+    arena.write_text(f"<mujoco><worldbody>{floor}</worldbody></mujoco>")
+    far = ALL_RANGES.set_back[1] + BODY_RADIUS - ALL_RANGES.body_radius[0]
+    robots = MujocoRobots(load_scene("epuck", str(arena)), 1, 1)
+    robots.embody(dataclasses.replace(Bodies.own(1), set_back=np.array([1.5 * far])))
+    assert (robots.reset(np.zeros((1, 3))).distance == -1).all()
+
+
+def test_a_watched_robot_moves_and_senses_as_in_a_batch():
+    scene = load_scene("epuck", "arena", TASK.control_step)
+    met, start = drawn(1, ranges=ALL_RANGES), STARTS[:1]
+    watched = DisturbedRobots(WatchedRobot(scene), met, TASK.control_step)
+    batch = robots_on(scene, start, met)
+    for robots in (watched, batch):
+        robots.reset(start)
+    for _ in range(5):
+        one, other = (robots.step(FULL[None]) for robots in (watched, batch))
+        np.testing.assert_array_equal(one.distance, other.distance)
+        np.testing.assert_array_equal(watched.clearances(), batch.clearances())
 
 
 @pytest.mark.parametrize("robot", RUNGS)
 def test_ideal_robots_have_nothing_of_the_disturbed_ones_before_them(robot):
     engine = BatchEngine(load_scene(robot, "arena", TASK.control_step), TASK, 1)
-    met, population = drawn(3, ranges=RANGES), genomes(5)
+    met, population = drawn(3, ranges=ALL_RANGES), genomes(5)
 
     def trials(disturbances):
         return evaluate(
@@ -209,7 +320,9 @@ def test_ideal_robots_have_nothing_of_the_disturbed_ones_before_them(robot):
     np.testing.assert_array_equal(trials(met), disturbed)
 
 
-@pytest.mark.parametrize("ranges", [BOOK, RANGES], ids=["book", "randomised"])
+@pytest.mark.parametrize(
+    "ranges", [BOOK, RANGES, ALL_RANGES], ids=["book", "randomised", "all"]
+)
 def test_threads_chunks_and_company_change_nothing(scene, ranges, monkeypatch):
     met, population = drawn(3, ranges=ranges), genomes(7)
 
@@ -310,7 +423,8 @@ def test_racing_and_seed_under_noise():
     assert raced == lived
     assert fewer < all_of_them
     own = {"randomise": False, "calibration": CALIBRATION}
-    for change in ({"seed": 2}, {"noise": "strong"}, {"randomise": False}, own):
+    other = {"randomise_all": True}
+    for change in ({"seed": 2}, {"noise": "strong"}, {"randomise": False}, own, other):
         changed = CONFIG.model_copy(update=change)
         assert histories(changed)[0] != raced
 
@@ -326,6 +440,8 @@ def test_noise_of_generations_differs():
 def test_what_makes_no_sense_is_refused():
     for keys, message in {
         "randomise: true": "^test: randomise needs noise: .* or strong, got none$",
+        "randomise_all: true": "^test: randomise_all needs noise: .*, got none$",
+        "calibration: {}, noise: strong, randomise_all: true": "got both",
         "calibration: {track: 0.05}": "calibration needs noise: calibrated or strong",
         "calibration: {}, noise: strong, randomise: true": "got both",
         "calibration: {tracks: 0.05}": "calibration: unknown tracks; available: prox",

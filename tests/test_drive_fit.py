@@ -40,6 +40,7 @@ from epuck_mj.rungs.disturbed import DisturbedRobots
 from epuck_mj.rungs.kinematic.plan import plan_of
 from epuck_mj.rungs.kinematic.robots import KinematicRobots
 from epuck_mj.scene.model import load_scene
+from epuck_mj.step.bodies import Bodies
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.disturbances import RANGES, Noise, draw_calibrated
@@ -59,7 +60,7 @@ class OwnWheels(KinematicRobots):
     def __init__(self, scene, own):
         super().__init__(scene, 1)
         self._own = own
-        self.embody(np.ones(1), np.ones(1), np.full(1, own.lag))
+        self.embody(dataclasses.replace(Bodies.own(1), lag=np.full(1, own.lag)))
 
     def step(self, command):
         left, right = (command * self._own.wheel_radii).T

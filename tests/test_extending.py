@@ -1,6 +1,7 @@
 """docs/extending.md works: its parts are written, run, resumed, studied and replayed.
 
-As a reader would: from a folder of one's own, with the installed wheel.
+As a reader would: from a folder of one's own, with the installed wheel, which is tested
+here as well.
 """
 
 import json
@@ -13,11 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from epuck_mj.__main__ import COMMANDS as ROBOT_COMMANDS
 from epuck_mj.errors import UserError
 from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.topology import OwnNetwork, check_network
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.fitness import StepFacts, step_fitness
+from evolution.__main__ import COMMANDS as EVOLUTION_COMMANDS
 from evolution.run.__main__ import evolve
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import load_config
@@ -135,6 +138,80 @@ def test_the_page_from_another_folder_with_the_wheel(folder, wheel):
         file = load_controller(folder / "runs" / name / "champion.json")
         assert len(file.origin.own_sha256) == 1
     assert "swarm" in (folder / "report" / "report.md").read_text()
+
+
+IN_THE_WHEEL = """
+import io, json, runpy, sys
+from contextlib import redirect_stdout
+
+import epuck_mj
+from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.model_files import MODELS
+from evolution.settings.config_files import CONFIGS, load_config, shipped_with
+from evolution.study.config import StudyConfig
+
+said = {}
+script, *commands = sys.argv[1:]
+for command in commands:
+    sys.argv = [script, command, "--help"]
+    with redirect_stdout(io.StringIO()) as out:
+        try:
+            runpy.run_path(script, run_name="__main__")
+        except SystemExit as end:
+            assert not end.code, command
+    said[command] = out.getvalue()
+arenas = [path.stem for path in MODELS.glob("arenas/*.xml")]
+for arena in ["arena", *arenas]:
+    load_scene("epuck", arena)
+for path in shipped_with("optimizer").values():
+    load_config(path)
+for path in shipped_with("experiments").values():
+    StudyConfig.load(path)
+print(json.dumps([epuck_mj.__file__, str(MODELS), str(CONFIGS), len(arenas), said]))
+"""
+"""All commands by their script, and all that is shipped, in an empty folder."""
+
+
+def contents(folder: Path, package: str) -> dict[Path, bytes]:
+    """What is in the files of a package, by their paths."""
+    files = [path for path in (folder / package).rglob("*.*") if path.is_file()]
+    return {
+        path.relative_to(folder): path.read_bytes()
+        for path in files
+        if "__pycache__" not in path.parts
+    }
+
+
+@pytest.mark.slow
+def test_the_wheel_has_all_that_is_shipped_and_its_commands_work(wheel, tmp_path):
+    here = contents(ROOT, "epuck_mj") | contents(ROOT, "evolution")
+    for path, content in contents(ROOT, "models").items():
+        here["epuck_mj" / path] = content
+    there = contents(wheel, "epuck_mj") | contents(wheel, "evolution")
+    assert sorted(there.keys() ^ here.keys()) == []
+    assert [path for path in there if there[path] != here[path]] == []
+
+    modules = {
+        module.rpartition(".")[2]: module
+        for module in EVOLUTION_COMMANDS | ROBOT_COMMANDS
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", IN_THE_WHEEL, str(wheel / "bin/epuck-mj"), *modules],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(wheel)},
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    package, models, configs, n_arenas, said = json.loads(done.stdout)
+    assert package == str(wheel / "epuck_mj/__init__.py")
+    assert models == str(wheel / "epuck_mj/models")
+    assert configs == str(wheel / "evolution/configs")
+    assert n_arenas == len(list((ROOT / "models/arenas").glob("*.xml")))
+    for command, module in modules.items():
+        assert f"usage: python -m {module} " in said[command]
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.fixture

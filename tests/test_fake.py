@@ -243,7 +243,7 @@ def test_ports_that_cannot_be_made(tmp_path):
         (["--journal", "no/robot.npz"], "cannot write .*no folder 'no'"),
         (["--pose", "nan", "0", "0"], "expected --pose of finite numbers"),
         (["--tcp", "0", "--link", "x"], "expected one of --link, --tcp and --wifi"),
-        (["--tcp", "99999"], "cannot listen on port 99999"),
+        (["--tcp", "99999"], "port 99999: expected one from 0 to 65535"),
         (["--link", "/no/such/folder"], "cannot make '/no/such/folder'"),
         (["--nonsense"], "nonsense"),
     ],

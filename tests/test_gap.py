@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import fields, replace
 
 import numpy as np
@@ -9,20 +10,22 @@ import pytest
 from matplotlib.image import imread
 from matplotlib.legend import Legend
 
-from epuck_mj.constants import TRACK, WHEEL_RADIUS
+from epuck_mj.constants import BODY_RADIUS, TRACK, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.table import RUNGS
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.step.control import TaskParameters
+from epuck_mj.step.disturbances import ALL_RANGES
 from epuck_mj.step.motors import Speeds
 from evolution.gap import worlds as gap_worlds
 from evolution.gap.__main__ import measure_gap
-from evolution.gap.figure import kept_figure
+from evolution.gap.figure import abroad_figure
 from evolution.gap.gap_document import gap_document
 from evolution.gap.groups import experiments, labels, peers
 from evolution.gap.outcomes import Outcome, abroad, ideal
+from evolution.gap.slowed import with_slowed
 from evolution.gap.transfer import (
     Gap,
     Transfer,
@@ -30,57 +33,119 @@ from evolution.gap.transfer import (
     rank_correlations,
     verdict,
 )
-from evolution.gap.worlds import ARENAS, LATENCY_MAX, WORLD_RANGES, World, met, worlds
+from evolution.gap.worlds import (
+    KINDS,
+    LOGARITHMS,
+    WHOLE,
+    WORLD_RANGES,
+    World,
+    met,
+    worlds,
+)
 from evolution.named_policies import NamedPolicy, named_policies
 from evolution.pages.blocks import to_markdown
-from evolution.pages.style import LOOKS
 from tests import shipped
 
 CHAMPION = shipped.champion_file()
 HOME = World(
+    kind="usual",
+    number=0,
     arena="arena",
     period=0.1,
     curve=1.0,
     gain_spread=0.0,
+    light=1.0,
     count_noise=0.0,
     wheel_radius=WHEEL_RADIUS,
     bias=0.0,
+    battery=1.0,
     track=TRACK,
     slip=0.0,
+    slipping=0,
+    grip=1.0,
     latency=0,
     mass=1.0,
     friction=1.0,
+    body_radius=BODY_RADIUS,
+    set_back=0.0,
 )
 FOLLOWER = NamedPolicy("wall-follower", WallFollower(), TaskParameters(steps=100))
 
 
-def test_a_hypercube_covers_every_range_evenly():
-    n = 40
-    found = worlds(n)
-    for name, (low, high) in WORLD_RANGES.items():
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_hypercube_covers_every_range_evenly(kind):
+    n, own = 60, KINDS[kind]
+    found = worlds(n, kind)
+    choices: dict = {"arena": own.arenas}
+    for name, (low, high) in own.ranges.items():
+        if name in WHOLE:
+            choices[name] = range(int(low), int(high) + 1)
+            continue
         values = np.array([getattr(world, name) for world in found])
-        values = np.log(values) if name == "curve" else values
-        part = np.floor((values - low) / (high - low) * n).astype(int)
+        ends = np.array([low, high])
+        if name in LOGARITHMS:
+            values, ends = np.log(values), np.log(ends)
+        part = np.floor((values - ends[0]) / np.ptp(ends) * n).astype(int)
         assert sorted(part) == list(range(n)), name
-    for name, choices in (("arena", ARENAS), ("latency", range(LATENCY_MAX + 1))):
-        counts = [[getattr(w, name) for w in found].count(c) for c in choices]
-        assert counts == [n // len(choices)] * len(choices), name
-    assert worlds(n) == found
-    assert worlds(n + 1)[:3] != found[:3]
+    for name, each in choices.items():
+        counts = [[getattr(w, name) for w in found].count(c) for c in each]
+        assert counts == [n // len(each)] * len(each), name
+    assert worlds(n, kind) == found
+    assert worlds(n + 1, kind)[:3] != found[:3]
+
+
+def test_ranges_half_as_wide_again_are_those_of_robots_that_can_be():
+    """About the same middle, but nothing below 0, no battery above its full speed."""
+    wider = KINDS["beyond"].ranges
+    assert set(wider) == set(WORLD_RANGES)
+    for name, expected in {
+        "track": (0.0495, 0.0585),
+        "body_radius": (0.03325, 0.03775),
+        "count_noise": (0.0, 4.5),
+        "battery": (0.85, 1.0),
+        "latency": (0, 4),
+        "grip": (0.0, 1.0),
+        "curve": (1.5**-1.5, 1.5**1.5),
+    }.items():
+        assert wider[name] == pytest.approx(expected), name
+    # what worlds share with robots that evolution randomises
+    for name in ("body_radius", "set_back", "light", "battery", "slipping", "grip"):
+        assert WORLD_RANGES[name] == getattr(ALL_RANGES, name)
+
+
+def test_starts_differ_from_world_to_world(monkeypatch):
+    seen = []
+    starts = gap_worlds.starts_in
+    monkeypatch.setattr(
+        "evolution.gap.outcomes.starts_in",
+        lambda *given: seen.append(starts(*given)) or seen[-1],
+    )
+    places = [HOME, replace(HOME, number=1), replace(HOME, kind="beyond")]
+    for _ in range(2):
+        list(abroad([FOLLOWER], places, "epuck_kinematic", 3, 1))
+    for i in range(3):
+        np.testing.assert_array_equal(seen[i], seen[i + 3])
+        assert (seen[i] != seen[i - 1]).any()
 
 
 def test_a_world_has_one_robot_and_new_noise_in_each_trial():
-    world = worlds(4)[1]
-    one, again, other = met(world, 1, 5, 9), met(world, 1, 5, 9), met(world, 2, 5, 9)
-    for name in ("gains", "age", "wheel_gains", "turn_gain", "latency", "mass"):
+    world = replace(worlds(4)[1], slipping=2, grip=0.25, slip=0.0, latency=1)
+    one, again = met(world, 5, 9), met(world, 5, 9)
+    other = met(replace(world, number=2), 5, 9)
+    shared = ("gains", "age", "wheel_gains", "turn_gain", "latency", "mass")
+    for name in (*shared, "wider", "set_back", "wheel_noise"):
         values = getattr(one, name)
         assert (values == values[0]).all(), name
         np.testing.assert_array_equal(getattr(again, name), values)
     assert (one.count_noise[0] != one.count_noise[1]).any()
     assert (one.gains != other.gains).any()
-    np.testing.assert_allclose(
-        one.wheel_gains[0].mean() * WHEEL_RADIUS, world.wheel_radius
-    )
+    radius = one.wheel_gains[0].mean() * WHEEL_RADIUS / world.battery
+    np.testing.assert_allclose(radius, world.wheel_radius)
+    np.testing.assert_allclose(BODY_RADIUS + one.wider, world.body_radius)
+    np.testing.assert_allclose(one.set_back, world.set_back)
+    np.testing.assert_allclose(1 + one.wheel_noise[0, :, 0], [1, 0.25, 0.25, *[1] * 6])
+    brighter = met(replace(world, light=2 * world.light), 5, 9)
+    np.testing.assert_allclose(brighter.gains, 2 * one.gains)
     left, right = one.wheel_gains[0]
     np.testing.assert_allclose((left - right) / one.wheel_gains[0].mean(), world.bias)
     np.testing.assert_allclose(TRACK / one.turn_gain, world.track)
@@ -97,6 +162,27 @@ def test_a_world_like_home_keeps_everything(robot):
     worse = replace(HOME, latency=3, curve=0.7)
     ((hurt,),) = abroad([FOLLOWER], [worse], robot, 20, 1)
     assert hurt.fitness < 0.5 * home.fitness
+    # so wide that its sensors see from farther in: no more room beside a wall
+    thick = replace(HOME, body_radius=0.037, set_back=0.002)
+    ((wide,),) = abroad([FOLLOWER], [thick], robot, 20, 1)
+    assert wide.fitness != same.fitness
+
+
+def test_a_slowed_policy_is_itself_at_another_speed():
+    """In a world without noise, three times as slow, it keeps off walls as well."""
+    at_speeds = with_slowed([FOLLOWER], (0.04, 0.5 * 0.04, 0.04, 0.13))
+    assert [each.name for each in at_speeds] == [
+        "wall-follower",
+        "wall-follower at 0.04 m/s",
+        "wall-follower at 0.02 m/s",
+    ]
+    own, slow = (each.task.speeds for each in at_speeds[:2])
+    assert slow.turn / own.turn == pytest.approx(slow.forward / own.forward)
+    assert all(each.policy is FOLLOWER.policy for each in at_speeds)
+    assert with_slowed([FOLLOWER], ()) == [FOLLOWER]
+    late = replace(HOME, latency=2)
+    ((fast, slower, _),) = abroad(at_speeds, [late], "epuck_kinematic", 20, 1)
+    assert slower.crash_rate < fast.crash_rate
 
 
 def test_ideal_robots_in_another_arena():
@@ -127,7 +213,8 @@ def test_a_trial_lasts_as_long_in_every_world():
 
 
 def outcomes(fitness, collisions):
-    return [Outcome(f, c, 0.0) for f, c in zip(fitness, collisions, strict=True)]
+    pairs = zip(fitness, collisions, strict=True)
+    return [Outcome(f, c, c / 4) for f, c in pairs]
 
 
 TRANSFER = Transfer.of(
@@ -171,7 +258,7 @@ def test_shares_and_mastered_worlds():
     assert found.mastered.value == 0.5
     assert found.mastered.low < 0.5 < found.mastered.high
     # nothing kept of nothing, and no division by it
-    nothing = Transfer(np.zeros(1), *[np.zeros((2, 1))] * 3)
+    nothing = Transfer(np.zeros(1), *[np.zeros((2, 1))] * 4)
     assert not nothing.share.any()
     assert verdict(nothing, 0).mastered.value == 0
 
@@ -182,7 +269,7 @@ def test_rank_correlations_of_hand_made_worlds():
     # a sixth is slower, and best everywhere
     all_home = np.append(home, 0.0)
     abroad = np.column_stack([worlds, np.full(4, 99.0)])
-    transfer = Transfer(all_home, abroad, abroad, abroad)
+    transfer = Transfer(all_home, *[abroad] * 4)
     fast = range(5)
     found = rank_correlations(transfer, fast)
     assert found is not None
@@ -199,9 +286,9 @@ def test_rank_correlations_of_hand_made_worlds():
         assert between_robots(transfer, transfer, few) is None
     # none at all is a correlation, too
     unrelated = np.array([[2.0, 5.0, 3.0, 1.0, 4.0]] * 2)
-    found = rank_correlations(Transfer(home, *[unrelated] * 3), fast)
+    found = rank_correlations(Transfer(home, *[unrelated] * 4), fast)
     assert found == pytest.approx({"home": 0.0, "worlds": 1.0})
-    alike = Transfer(np.ones(5), *[np.ones((3, 5))] * 3)
+    alike = Transfer(np.ones(5), *[np.ones((3, 5))] * 4)
     assert rank_correlations(alike, fast) is between_robots(alike, alike, fast) is None
 
 
@@ -224,6 +311,20 @@ def test_policies_are_grouped_by_experiment_and_by_speed():
         "b/champion.json": [5],
         "wall-follower": [6],
     }
+    both = with_slowed([policies[0], policies[2], FOLLOWER], (0.04,))
+    slowly = experiments(both)
+    assert slowly == {
+        "runs/paper/de-best": [0],
+        "runs/paper/de-best at 0.04 m/s": [1],
+        "runs/wheels/de-best": [2],
+        "runs/wheels/de-best at 0.04 m/s": [3],
+        "wall-follower": [4],
+        "wall-follower at 0.04 m/s": [5],
+    }
+    assert labels(both, slowly)["wall-follower at 0.04 m/s"] == (
+        "hand-written wall follower at 0.04 m/s"
+    )
+    assert peers(both) == {"0.129 m/s": [0, 2, 4], "0.04 m/s": [1, 3, 5]}
     # a run that says nothing of its config has no other name
     assert list(labels(policies, experiments(policies)).values())[-2:] == [
         "b/champion.json",
@@ -236,14 +337,19 @@ def test_the_document_says_who_kept_what():
     names = ["a/seed-1", "a/seed-2", "b"]
     groups = {"a": [0, 1], "b": [2]}
     transfers, peers_of = {"epuck": TRANSFER}, {"0.1 m/s": [0, 1, 2]}
-    text = to_markdown(
-        gap_document(Gap(names, transfers, groups, peers_of, 5, LATENCY))
-    )
+    gap = Gap("usual", names, transfers, groups, peers_of, 5, LATENCY)
+    text = to_markdown(gap_document([gap, replace(gap, kind="corners")]))
     assert "3 policies, unchanged, in 4 worlds" in text
-    assert "| a | a/seed-1 | 0.500 |" in text
+    titles = "| n | usual worlds | outer corners and posts | at home | kept |"
+    assert titles in text
+    # fitness 0.3525 and 0.35, crashes in none and in 9.4 % of the trials
+    there = "0.351, 4.7%"
+    assert f"| a | 0.1 m/s | epuck | 2 | {there} | {there} | 0.450 | 76% |" in text
+    (first, *_) = re.findall(r"\| a \| a/seed-1 \| .*", text)
+    assert re.match(r"\| a \| a/seed-1 \| 0\.352 \[.*\] \| 0\.0% \[0", first)
     assert "50% [15%, 85%]" in text
     # kept 70.5 % and 81.25 %, mastered 50 % and 25 %
-    assert "| a | 0.1 m/s | epuck | 2 | 0.450 | 76% | 0.2 | 38% | 38% |" in text
+    assert "| a | epuck | 2 | 0.450 | 76% | 0.2 | 38% | 38% |" in text
     # of three policies, ranks say nothing
     assert "Ranks" not in text
     members = [0, 1, 2, 0, 1]
@@ -253,14 +359,14 @@ def test_the_document_says_who_kept_what():
     both = {"epuck": more, "epuck_kinematic": more}
     ranked = to_markdown(
         gap_document(
-            Gap(list("abcde"), both, groups, {"0.1 m/s": range(5)}, 5, LATENCY)
+            [Gap("usual", [*"abcde"], both, groups, {"0.1 m/s": range(5)}, 5, LATENCY)]
         )
     )
     assert "- 5 policies of 0.1 m/s, epuck: between home and a world, " in ranked
     assert "by mean fitness over the worlds, 1.00" in ranked
-    # late in the second and the third world: shares 0.82, 0.4 and 0.5, 1
+    # late in the second and the third world: fitness 0.305 and 0.35, crashes 0, 12.5 %
     assert "| experiment | robot | n | 0 | 2 |" in text
-    assert "| a | epuck | 2 | 84% | 68% |" in text
+    assert "| a | epuck | 2 | 0.375, 3.1% | 0.328, 6.2% |" in text
 
 
 def test_the_figure_names_experiments_as_reports_do():
@@ -271,41 +377,56 @@ def test_the_figure_names_experiments_as_reports_do():
         *(getattr(TRANSFER, f.name)[..., members] for f in fields(TRANSFER))
     )
     names = [policy.name for policy in policies]
-    gap = Gap(names, {"epuck": transfer}, groups, {"fast": members}, 5, LATENCY)
-    figure = kept_figure(gap, labels(policies, groups))
+    gaps = [
+        Gap(kind, names, {"epuck": transfer}, groups, {"fast": members}, 5, LATENCY)
+        for kind in KINDS
+    ]
+    figure = abroad_figure(gaps, labels(policies, groups))
     (legend,) = figure.legends
     assert isinstance(legend, Legend)
-    assert [text.get_text() for text in legend.get_texts()] == [
-        "DE/best/1/bin (n = 1)",
-        "hand-written wall follower (n = 1)",
+    titles = [text.get_text() for text in legend.get_texts()]
+    assert titles == [kind.title for kind in KINDS.values()]
+    fitness, crashes = figure.axes
+    assert [text.get_text() for text in fitness.get_yticklabels()] == [
+        "DE/best/1/bin (1)",
+        "hand-written wall follower (1)",
     ]
-    champion, follower, *_ = figure.axes[0].lines
-    assert champion.get_color() == LOOKS["de-best"].color
-    assert follower.get_color() == "black"
+    for axes, values in ((fitness, transfer.fitness), (crashes, transfer.crash_rate)):
+        assert len(axes.lines) == len(KINDS)
+        drawn = np.asarray(axes.lines[0].get_xdata())
+        np.testing.assert_allclose(drawn, values.mean(axis=0))
 
 
 def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
     output = tmp_path / "new" / "gap"
     arguments = ["wall-follower", str(CHAMPION), "--output", str(output)]
     small = ["--worlds", "3", "--starts", "2", "--robot", "epuck_kinematic"]
+    small += ["--speeds", "0.04"]
     assert measure_gap([*arguments, *small]) == 0
     names = {path.name for path in output.iterdir()}
     pictures = {"gap.png", "gap.svg", "gap.pdf"}
     assert names == {"gap.md", "summary.md", "gap.json", "gap.csv", *pictures}
     assert (output / "gap.md").read_text() in capsys.readouterr().out
     record = json.loads((output / "gap.json").read_text())
-    assert len(record["worlds"]) == 3
-    policies = record["robots"]["epuck_kinematic"]
-    assert list(policies) == ["wall-follower", str(CHAMPION)]
+    assert {
+        kind: len(each) for kind, each in record["worlds"].items()
+    } == dict.fromkeys(KINDS, 3)
+    kinds = record["robots"]["epuck_kinematic"]
+    slow = "wall-follower at 0.04 m/s"
+    assert list(kinds["usual"])[:3] == ["wall-follower", slow, str(CHAMPION)]
     with (output / "gap.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 2 * 3
+    assert len(rows) == 4 * 3 * len(KINDS)
     for row in rows:
-        policy, world = policies[row["policy"]], int(row["world"])
+        kind, world = row["kind"], int(row["number"])
+        policy = kinds[kind][row["policy"]]
         there = policy["abroad"][world]["fitness"]
         share = there / max(policy["home"], policy["ideal"][world])
         assert float(row["share"]) == pytest.approx(share, abs=1e-4)
-        assert row["arena"] == record["worlds"][int(row["world"])]["arena"]
+        assert float(row["fitness"]) == pytest.approx(there, abs=1e-4)
+        crashes = policy["abroad"][world]["crash_rate"]
+        assert float(row["crash_rate"]) == pytest.approx(crashes, abs=1e-4)
+        assert row["arena"] == record["worlds"][kind][world]["arena"]
     assert imread(output / "gap.png").shape[1] > 1000
     first = (output / "gap.json").read_bytes()
     monkeypatch.setattr("evolution.gap.gap_folder.write_figure", lambda *_: None)
@@ -327,6 +448,8 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
             "from 2 to 1,000, got 0",
         ),
         (["wall-follower", "--threads", "-1"], "threads"),
+        (["wall-follower", "--speeds", "0.04", "-1"], "--speeds.*, got -1"),
+        (["wall-follower", "--speeds", "3"], "--speeds.*got 3"),
         (["wall-follower", "--robot", "tank"], "no robot 'tank'"),
     ],
 )
@@ -337,7 +460,7 @@ def test_bad_input_is_one_line(arguments, words, tmp_path):
 
 
 def test_every_arena_of_the_worlds_is_shipped():
-    for arena in gap_worlds.ARENAS:
+    for arena in (*gap_worlds.ARENAS, *gap_worlds.CORNERS):
         ((found,),) = abroad(
             [FOLLOWER], [replace(HOME, arena=arena)], "epuck_kinematic", 2, 1
         )

@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,15 @@ from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.disturbed import disturbed
 from epuck_mj.rungs.kinematic import compiling
 from epuck_mj.rungs.kinematic.fused import FITNESS, FusedTrials
-from epuck_mj.rungs.kinematic.kernel import COS, SIN, X, Y, distance_to, sense_all
+from epuck_mj.rungs.kinematic.kernel import (
+    COS,
+    N_OWN,
+    SIN,
+    X,
+    Y,
+    distance_to,
+    sense_all,
+)
 from epuck_mj.rungs.kinematic.plan import plan_of
 from epuck_mj.rungs.kinematic.robots import ENDLESS, KinematicRobots, at_rest, substeps
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
@@ -26,6 +35,7 @@ from epuck_mj.scene.clearance import CLEARANCE_MAX, ClearanceProbe
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.model_files import MODELS
 from epuck_mj.scene.starts import FreeSpace
+from epuck_mj.step.bodies import Bodies
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import Everybody, TaskParameters, run_trials
 from epuck_mj.step.disturbances import Disturbances
@@ -95,9 +105,29 @@ def test_compiled_trials_have_the_bits_of_the_loop_for_every_task(
 ):
     task = TaskParameters(60, 0.07, fitness, 0.05)
     square = load_scene(ROBOT, "arena", task.control_step)
-    met = Conditions("strong", True).draw(np.random.default_rng(2), 30, task.steps)
+    every = Conditions("strong", randomise_all=True)
+    met = every.draw(np.random.default_rng(2), 30, task.steps)
     both_ways(square, task, network, met, 30, threads)
     both_ways(square, task, network, None, 30, threads)
+
+
+def test_shells_and_sensors_are_mujoco_s(square):
+    """A thousand poses, each of a robot with a shape of its own."""
+    rng, n = np.random.default_rng(3), 1000
+    poses = rng.uniform([-0.464, -0.464, -np.pi], [0.464, 0.464, np.pi], (n, 3))
+    shapes = rng.uniform([[-0.001], [0.0]], [[0.0065], [0.003]], (2, n))
+    bodies = replace(Bodies.own(n), wider=shapes[0], set_back=shapes[1])
+    rolling, on_wheels = KinematicRobots(square, n), MujocoRobots(square, n, 1)
+    found, expected = [], []
+    for robots, readings in ((rolling, found), (on_wheels, expected)):
+        robots.embody(bodies)
+        readings.append(robots.reset(poses))
+    np.testing.assert_allclose(found[0].distance, expected[0].distance, atol=1e-9)
+    np.testing.assert_allclose(rolling.clearances(), on_wheels.clearances(), atol=1e-9)
+    # MuJoCo tells of touches after a step
+    touch = on_wheels.step(np.zeros((n, 2))).contact
+    np.testing.assert_array_equal(found[0].contact, touch)
+    assert 5 < touch.sum() < n / 2
 
 
 def test_any_chunking_gives_the_same_bits(square):
@@ -218,7 +248,8 @@ def test_rays_and_clearance_are_mujoco_s(tmp_path, seed):
     # whatever a grid leaves out is out of reach
     near = np.empty_like(found.distance)
     plan = plan_of(scene, 0.04, 0.1)
-    sense_all(plan, at_rest(poses), 0.04, near)
+    own = np.zeros((len(poses), N_OWN))
+    sense_all(plan, at_rest(poses), own, 0.04, near)
     seen = (found.distance >= 0) & (found.distance <= 0.04)
     np.testing.assert_array_equal(near, np.where(seen, found.distance, -1))
     plan = plan_of(scene, ENDLESS, 0.1)
@@ -324,7 +355,7 @@ def test_states_keep_their_heading(square):
 
 def test_heavier_robots_lag_longer_and_larger_wheels_may_turn_faster(square):
     robots = KinematicRobots(square, 2)
-    robots.embody(np.array([0.5, 2.0]), np.ones(2), np.ones(2))
+    robots.embody(replace(Bodies.own(2), mass=np.array([0.5, 2.0])))
     robots.reset(np.array([[0, 0, 0.0], [0, 0.2, 0.0]]))
     robots.step(np.full((2, 2), 7.0))
     light, heavy = robots.poses()[:, 0]

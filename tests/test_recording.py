@@ -208,7 +208,8 @@ def test_trials_of_unequal_length_share_a_file(two, trajectory, network):
 def test_marks_and_series_tell_trials_apart(one, two, root):
     name = {CRASHING: "straight on", FOLLOWING: "test 1: left"}[root]
     mark = f"{root}/robot/epuck/mark"
-    assert two.column(mark, "Points3D:labels", static=True) == [[name]]
+    label = f"{root}/robot/epuck/name"
+    assert two.column(label, "Points3D:labels", static=True) == [[name]]
     red, green, blue = TRIALS[[CRASHING, FOLLOWING].index(root)]
     rgba = [red << 24 | green << 16 | blue << 8 | 255]
     assert two.column(mark, "Points3D:colors", static=True) == [rgba]
@@ -216,8 +217,9 @@ def test_marks_and_series_tell_trials_apart(one, two, root):
         entity = f"{root}/signals/{signal}"
         assert two.column(entity, "SeriesLines:names", static=True) == [[name]]
         assert two.column(entity, "SeriesLines:colors", static=True) == [rgba]
-    # one needs no mark
-    assert not any("mark" in entity for entity in one.static)
+    # one needs neither
+    ends = {entity.rpartition("/")[2] for entity in one.static}
+    assert not ends & {"mark", "name"}
 
 
 def test_equal_names_are_kept_apart(scene, network, tmp_path):
@@ -232,7 +234,7 @@ def test_equal_names_are_kept_apart(scene, network, tmp_path):
     logged = {"/".join(e.split("/")[1:3]) for e in contents.in_time}
     assert logged == set(roots)
     labels = [
-        contents.column(f"/{root}/robot/epuck/mark", "Points3D:labels", static=True)
+        contents.column(f"/{root}/robot/epuck/name", "Points3D:labels", static=True)
         for root in roots
     ]
     assert labels == [[[name]] for name in names]

@@ -6,11 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 from epuck_mj.errors import UserError
 from epuck_mj.scene.model import load_scene
 from epuck_mj.show import render
-from epuck_mj.show.colors import HIGH_FITNESS, LOW_FITNESS, TRIALS
+from epuck_mj.show import still as still_picture
+from epuck_mj.show.colors import HIGH_FITNESS, LOW_FITNESS, TRIALS, VERMILION
+from epuck_mj.show.pictures import save_below, save_figure
+from epuck_mj.show.rays import FREE_COLOR, ray_lines
 from epuck_mj.show.render import painter
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.trials.recorder import record
@@ -180,6 +184,44 @@ def test_a_trial_without_steps_can_be_drawn(scene):
     trajectory = record(scene, still, np.zeros(3), TaskParameters(steps=1))
     with painter(scene, [trajectory] * 2, *SIZE) as artist:
         assert artist.picture().std() > 10
+
+
+@needs_opengl
+def test_a_close_up_shows_the_rays_in_their_colours(scene):
+    orange = []
+    # 5 mm from a wall, and in the very middle
+    for x in (0.46, 0.0):
+        once = TaskParameters(steps=1)
+        trajectory = record(scene, still, np.array([x, 0.0, np.pi / 2]), once)
+        with painter(scene, [trajectory], *SIZE) as artist:
+            before = artist.picture()
+            orange.append(hue(artist.close_up(0.04), VERMILION).sum())
+            np.testing.assert_array_equal(artist.picture(), before)
+    assert orange[0] > orange[1] + 20
+
+
+def test_rays_end_where_something_is_or_the_range_ends(scene):
+    trajectory = record(scene, ahead, np.array([0.4, 0.0, 0.0]), TASK)
+    lines, colors = ray_lines(scene, trajectory, 0.04)
+    assert lines.shape == (trajectory.steps + 1, 8, 2, 3)
+    length = np.linalg.norm(lines[:, :, 1] - lines[:, :, 0], axis=-1)
+    hit = (trajectory.distance >= 0) & (trajectory.distance < 0.04)
+    assert hit.any() and not hit.all()
+    np.testing.assert_allclose(length, np.where(hit, trajectory.distance, 0.04))
+    np.testing.assert_array_equal(colors[0, ~hit[0]], np.full((8, 3), FREE_COLOR))
+
+
+@needs_opengl
+def test_a_still_has_its_size_and_a_legend(scene, trajectory, other, tmp_path):
+    for trajectories in ([trajectory], [trajectory, other]):
+        figure = still_picture.still(scene, trajectories, 0.04, (600, 400))
+        save_figure(figure, tmp_path / "a.png", still_picture.DPI)
+        pixels = imread(tmp_path / "a.png")
+        assert pixels.shape[:2] == (400, 600)
+        save_below((tmp_path / "a.png").read_bytes(), 50, tmp_path / "b.png")
+        np.testing.assert_array_equal(imread(tmp_path / "b.png"), pixels[50:])
+        labels = {axes.get_xlabel() for axes in figure.axes} - {""}
+        assert labels == {"path: step fitness", "rays: distance seen [cm]"}
 
 
 def test_without_opengl_one_line_says_what_is_missing(scene, trajectory, monkeypatch):

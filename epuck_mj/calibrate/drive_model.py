@@ -24,7 +24,7 @@ from epuck_mj.calibrate.parameters import (
 )
 from epuck_mj.calibrate.recorded_drive import RecordedDrive
 from epuck_mj.constants import N_PROXIMITY, PROXIMITY_PERIOD, TRACK, WHEEL_RADIUS
-from epuck_mj.rungs.kinematic.kernel import sense_all
+from epuck_mj.rungs.kinematic.kernel import N_OWN, sense_all
 from epuck_mj.rungs.kinematic.plan import Plan
 from epuck_mj.rungs.kinematic.robots import at_rest
 from epuck_mj.step.motors import STEP_ANGLE
@@ -211,7 +211,9 @@ class DriveModel:
     def distances(self, poses: np.ndarray) -> np.ndarray:
         """Length of each ray from poses `(n, 3)`, at most SIGHT [m], `(n, 8)`."""
         found = np.empty((len(poses), N_PROXIMITY))
-        sense_all(self.plan, at_rest(poses), SIGHT, found)
+        # sensors are where the plan has them
+        own = np.zeros((len(poses), N_OWN))
+        sense_all(self.plan, at_rest(poses), own, SIGHT, found)
         return np.where(found < 0, SIGHT, found)
 
     def linearised(self, poses: np.ndarray, parameters: np.ndarray) -> Linearised:

@@ -98,6 +98,11 @@ def _in_one_line(text: str, prog: str) -> str:
         meant = re.search(r"Perhaps you meant:\W+(--[\w-]+)", text)
         hint = f"did you mean {meant[1]}?" if meant else f"see {prog} --help"
         return f"unknown option {unknown}; {hint}"
+    if message.startswith("Missing from"):
+        # each with its name first
+        missing = message.partition(": ")[2].split("(required)")[:-1]
+        names = ", ".join(text.split()[0] for text in missing)
+        return f"expected {names}, got none; see {prog} --help"
     return message
 
 

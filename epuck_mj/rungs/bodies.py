@@ -1,9 +1,11 @@
-"""Robots with bodies of their own in MuJoCo: masses, friction, faster wheels."""
+"""Robots with bodies of their own in MuJoCo: masses, shapes, faster wheels."""
 
+import mujoco
 import numpy as np
 
 from epuck_mj.scene.model import Scene
-from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL
+from epuck_mj.scene.robot_parts import PROXIMITY, ROBOT_BODY, SHELL
+from epuck_mj.step.bodies import Bodies
 
 SPARE_SPEED = 2.0
 """Highest wheel speed of embodied robots, as a multiple of the actuators' limits."""
@@ -19,19 +21,17 @@ def wheel_limits(scene: Scene, n: int) -> Fields:
     return {"actuator_ctrlrange": (scene.wheels, np.repeat(own[None], n, axis=0))}
 
 
-def body_fields(
-    scene: Scene, mass: np.ndarray, friction: np.ndarray, lag: np.ndarray
-) -> Fields:
+def body_fields(scene: Scene, bodies: Bodies) -> Fields:
     """Masses, inertias, friction and servos of robots with other bodies.
 
+    Servos of half the gain take twice the time.
+
     Args:
-        scene: whose robot has mass, friction and lag 1.
-        mass: of each robot against the scene's, `(robots,)`.
-        friction: of all its geoms but the shell, likewise.
-        lag: of its drive's time constants, likewise: servos of half the gain take
-            twice the time.
+        scene: whose robot is what bodies differ from.
+        bodies: of the robots, `(robots,)`.
     """
     model = scene.model
+    mass, friction, lag = bodies.mass, bodies.friction, bodies.lag
     robot = model.body_rootid == model.body(ROBOT_BODY).id
     tyres = robot[model.geom_bodyid]
     tyres[model.geom(SHELL).id] = False
@@ -47,3 +47,25 @@ def body_fields(
             for name in ("actuator_gainprm", "actuator_biasprm")
         },
     }
+
+
+def shape_fields(scene: Scene, bodies: Bodies) -> Fields:
+    """Radii of the shells and places of the sensors; see `body_fields`.
+
+    What MuJoCo works out from them, such as bounding boxes, follows by `mj_setConst`.
+    """
+    model = scene.model
+    shell = np.array([model.geom(SHELL).id])
+    size = np.repeat(model.geom_size[None, shell], len(bodies), axis=0)
+    size[:, 0, 0] += bodies.wider
+    sites = np.array([model.sensor(name).objid[0] for name in PROXIMITY])
+    # a ray leaves along its site's z axis
+    away = np.array([_z_axis(model.site_quat[site]) for site in sites])
+    place = model.site_pos[sites] + bodies.outward[:, None, None] * away
+    return {"geom_size": (shell, size), "site_pos": (sites, place)}
+
+
+def _z_axis(quaternion: np.ndarray) -> np.ndarray:
+    axes = np.empty(9)
+    mujoco.mju_quat2Mat(axes, quaternion)
+    return axes.reshape(3, 3)[:, 2]

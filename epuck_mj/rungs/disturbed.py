@@ -63,9 +63,7 @@ class DisturbedRobots:
         self._share = given.age / self._control_step
         # the robot stands: older commands were 0
         self._sent = np.zeros((len(starts), given.latency.max() + 1, 2))
-        self._robots.embody(
-            given.mass[given.of], given.friction[given.of], given.lag[given.of]
-        )
+        self._robots.embody(given.bodies)
         reading = self._robots.reset(starts)
         self._before = _within_reach(reading.distance)
         return self._sensed(reading, slice(None))
@@ -86,9 +84,9 @@ class DisturbedRobots:
 
     def restart(self, which: np.ndarray, starts: np.ndarray) -> Reading:
         """See `Robots.restart`; other disturbances come by `renew`."""
-        given, of = self._disturbances, self._of[which]
+        given = self._disturbances
         self._k[which], self._sent[which] = 0, 0.0
-        self._robots.embody(given.mass[of], given.friction[of], given.lag[of], which)
+        self._robots.embody(given.bodies[which], which)
         reading = self._robots.restart(which, starts)
         self._before[which] = _within_reach(reading.distance)
         return self._sensed(reading, which)

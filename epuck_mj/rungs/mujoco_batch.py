@@ -11,10 +11,11 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from epuck_mj.rungs.bodies import body_fields, wheel_limits
+from epuck_mj.rungs.bodies import body_fields, shape_fields, wheel_limits
 from epuck_mj.rungs.warnings import heeded, silence
-from epuck_mj.scene.clearance import ClearanceProbe
+from epuck_mj.scene.clearance import ClearanceProbe, beside_wider
 from epuck_mj.scene.model import Scene
+from epuck_mj.step.bodies import Bodies
 from epuck_mj.step.sensors import Reading
 
 
@@ -41,7 +42,8 @@ class MujocoRobots:
         self._history = self._batch.bind("history")
         self._about, self._warned = np.moveaxis(self._batch.warning, -1, 0)
         self._active = np.zeros(0, np.int32)
-        self._embodied = False
+        self._embodied = self._shaped = False
+        self._wider = np.zeros(capacity)
         self._threads = threads
 
     def reset(self, starts: np.ndarray) -> Reading:
@@ -79,22 +81,18 @@ class MujocoRobots:
             )
         return self._reading(self._active)
 
-    def embody(
-        self,
-        mass: np.ndarray,
-        friction: np.ndarray,
-        lag: np.ndarray,
-        which: np.ndarray | None = None,
-    ) -> None:
+    def embody(self, bodies: Bodies, which: np.ndarray | None = None) -> None:
         """See `Simulator.embody`."""
-        changes = wheel_limits(self.scene, len(mass))
-        ids = np.arange(len(mass)) if which is None else which
+        changes = wheel_limits(self.scene, len(bodies))
+        ids = np.arange(len(bodies)) if which is None else which
         ids = ids.astype(np.int32)
-        others = self._embodied or any(
-            (each != 1).any() for each in (mass, friction, lag)
-        )
+        self._wider[ids] = bodies.wider
+        self._shaped |= bodies.shaped
+        others = self._embodied or bodies.changed
         if others:
-            changes |= body_fields(self.scene, mass, friction, lag)
+            changes |= body_fields(self.scene, bodies)
+        if self._shaped:
+            changes |= shape_fields(self.scene, bodies)
         for name, (where, values) in changes.items():
             places = np.flatnonzero(where) if where.dtype == bool else where
             self._batch.expand(name)[ids[:, None], places] = values
@@ -106,8 +104,8 @@ class MujocoRobots:
     def disembody(self) -> None:
         """See `Simulator.disembody`."""
         if self._embodied:
-            self.embody(*np.ones((3, self.capacity)))
-            self._embodied = False
+            self.embody(Bodies.own(self.capacity))
+            self._embodied = self._shaped = False
 
     def keep(self, mask: np.ndarray) -> None:
         """Keep only the active robots that `mask` `(active,)` selects."""
@@ -119,7 +117,8 @@ class MujocoRobots:
 
     def clearances(self) -> np.ndarray:
         """Distances from the active robots to the nearest wall [m], `(active,)`."""
-        return self._probe.measure(self.poses()).distance
+        nominal = self._probe.measure(self.poses()).distance
+        return beside_wider(nominal, self._wider[self._active])
 
     @cached_property
     def _probe(self) -> ClearanceProbe:

@@ -6,6 +6,7 @@ import numpy as np
 
 from epuck_mj.policies.changes import WithChanges
 from epuck_mj.policies.network import Controller
+from epuck_mj.step.bodies import Bodies
 from epuck_mj.step.control import Robots, Trials
 from epuck_mj.step.disturbances import Disturbances
 
@@ -15,21 +16,13 @@ class Simulator(Robots, Protocol):
 
     capacity: int
 
-    def embody(
-        self,
-        mass: np.ndarray,
-        friction: np.ndarray,
-        lag: np.ndarray,
-        which: np.ndarray | None = None,
-    ) -> None:
+    def embody(self, bodies: Bodies, which: np.ndarray | None = None) -> None:
         """Give the robots bodies of their own, from their next reset or restart on.
 
         Their wheels may turn faster than a firmware would ask for: larger ones do.
 
         Args:
-            mass: of each robot against the scene's, `(robots,)`.
-            friction: of all but its shell, likewise.
-            lag: of its drive's time constants, likewise.
+            bodies: of the robots, `(robots,)`.
             which: numbers of the robots, `(robots,)`; None for the first of all.
         """
         ...

@@ -7,10 +7,11 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
-from epuck_mj.rungs.bodies import body_fields, wheel_limits
+from epuck_mj.rungs.bodies import body_fields, shape_fields, wheel_limits
 from epuck_mj.rungs.warnings import heeded, silence
-from epuck_mj.scene.clearance import ClearanceProbe
+from epuck_mj.scene.clearance import ClearanceProbe, beside_wider
 from epuck_mj.scene.model import Scene
+from epuck_mj.step.bodies import Bodies
 from epuck_mj.step.sensors import Reading
 
 
@@ -33,7 +34,7 @@ class WatchedRobot:
         self.model = copy.copy(scene.model)
         self.data = mujoco.MjData(self.model)
         self.moved: Callable[[], None] = lambda: None
-        self._embodied = False
+        self._embodied, self._wider = False, np.zeros(1)
 
     def reset(self, starts: np.ndarray) -> Reading:
         """Put the robot at rest on a start `(1, 3)`: x, y [m], yaw [rad]."""
@@ -66,16 +67,11 @@ class WatchedRobot:
         """Pose of the robot, `(1, 3)`: x, y [m], yaw [rad]."""
         return self.scene.poses(self.data.qpos[None])
 
-    def embody(
-        self,
-        mass: np.ndarray,
-        friction: np.ndarray,
-        lag: np.ndarray,
-        which: np.ndarray | None = None,
-    ) -> None:
+    def embody(self, bodies: Bodies, which: np.ndarray | None = None) -> None:
         """See `Simulator.embody`."""
-        fields = body_fields(self.scene, mass, friction, lag)
+        fields = body_fields(self.scene, bodies) | shape_fields(self.scene, bodies)
         fields |= wheel_limits(self.scene, 1)
+        self._wider = bodies.wider
         for name, (where, values) in fields.items():
             getattr(self.model, name)[where] = values[0]
         mujoco.mj_setConst(self.model, self.data)
@@ -84,12 +80,12 @@ class WatchedRobot:
     def disembody(self) -> None:
         """See `Simulator.disembody`."""
         if self._embodied:
-            self.embody(np.ones(1), np.ones(1), np.ones(1))
+            self.embody(Bodies.own(1))
             self._embodied = False
 
     def clearances(self) -> np.ndarray:
         """Distance from the robot's shell to the nearest wall [m], `(1,)`."""
-        return self._probe.measure(self.poses()).distance
+        return beside_wider(self._probe.measure(self.poses()).distance, self._wider)
 
     @cached_property
     def _probe(self) -> ClearanceProbe:

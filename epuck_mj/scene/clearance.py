@@ -131,6 +131,14 @@ class ClearanceProbe:
         return self._probes[key]
 
 
+def beside_wider(distance: np.ndarray, wider: np.ndarray) -> np.ndarray:
+    """Clearance of shells that are so much wider than those of `distance` [m].
+
+    Exact beside upright walls.
+    """
+    return np.where(distance < CLEARANCE_MAX, distance - wider, distance)
+
+
 def _by_square(poses: np.ndarray, side: float) -> list[np.ndarray]:
     """Indices of poses `(n, 3)` by the square of a side [m] that they are in."""
     square = np.floor(poses[:, :2] / side)

@@ -3,9 +3,8 @@
 import io
 from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.image import imsave
+from matplotlib.image import imread, imsave
 
 from epuck_mj.host.files import write_bytes, writing
 
@@ -25,12 +24,13 @@ def save_figure(figure: Figure, path: str | Path, dpi: int = 150) -> None:
         write_bytes(Path(path), content.getvalue())
 
 
-def save_pixels(pixels: np.ndarray, path: str | Path) -> None:
-    """Write pixels `(height, width, 3)`, 0 to 255, as PNG.
+def save_below(picture: bytes, rows: int, path: str | Path) -> None:
+    """Write a PNG without its upper rows, as PNG.
 
     Raises:
         UserError: if it cannot be written.
     """
+    pixels = imread(io.BytesIO(picture), format="png")[rows:]
     content = io.BytesIO()
     imsave(content, pixels, format="png", metadata={"Software": "epuck_mj"})
     with writing():

@@ -5,6 +5,7 @@ The context of OpenGL is made here, whatever MuJoCo itself would choose.
 
 import copy
 import importlib
+import itertools
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -18,6 +19,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.scene.geometry import arena_box, drawn
 from epuck_mj.scene.model import Scene
 from epuck_mj.show.colors import HIGH_FITNESS, LOW_FITNESS, TRIALS, blend
+from epuck_mj.show.rays import ray_lines
 from epuck_mj.trials.trajectory import Trajectory
 
 LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}
@@ -29,7 +31,7 @@ PATH_HEIGHT = 0.003
 PATH_RADIUS = 0.004
 """Radius of the path as drawn [m]."""
 
-ELEVATION = -60.0
+ELEVATION = -72.0
 """Elevation of the camera's line of sight [degrees]."""
 
 MARK_HEIGHT, MARK_RADIUS = 0.07, 0.012
@@ -38,8 +40,17 @@ MARK_HEIGHT, MARK_RADIUS = 0.07, 0.012
 DRAFT_SHADOWS = 1024
 """Size of a draft's shadow map [pixels]."""
 
-CAMERA_DISTANCE = 1.05
-"""Distance of the camera from the arena's middle, in diagonals of the arena."""
+CAMERA_MARGIN = 1.04
+"""Size of what a picture shows, in sizes of the box around the arena."""
+
+CLOSE_DISTANCE, CLOSE_ELEVATION = 0.24, -50.0
+"""Distance of a close-up's camera from the robot [m], and its elevation [degrees]."""
+
+AGAINST = 2.0
+"""How much a close-up's camera looks against the heading, in shares of outwards."""
+
+RAY_RADIUS = 0.0012
+"""Radius of a sensor's ray as drawn [m]."""
 
 _CATEGORY = mujoco.mjtCatBit
 
@@ -76,7 +87,7 @@ class Painter:
         steps = sum(trajectory.steps + 1 for trajectory in trajectories)
         most = (model.ngeom + 1) * len(trajectories) + steps + 100
         self._view = mujoco.MjvScene(model, most)
-        self._camera = _camera(model)
+        self._camera = _camera(model, width / height)
         scale = mujoco.mjtFontScale.mjFONTSCALE_100.value
         self._context = mujoco.MjrContext(model, scale)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
@@ -88,6 +99,30 @@ class Painter:
         Returns:
             Picture `(height, width, 3)`, 0 to 255.
         """
+        self._compose(time)
+        return self._pixels()
+
+    def close_up(self, sensor_range: float) -> np.ndarray:
+        """The first robot at the end of its trial with its rays, seen from inside.
+
+        Args:
+            sensor_range: where a ray ends that hits nothing [m].
+
+        Returns:
+            Picture `(height, width, 3)`, 0 to 255.
+        """
+        trajectory, whole = self._trajectories[0], self._camera
+        self._camera = _close_camera(self._model, trajectory.pose[-1])
+        try:
+            self._compose(np.inf)
+        finally:
+            self._camera = whole
+        lines, colors = ray_lines(self._scene, trajectory, sensor_range)
+        _add_lines(self._view, lines[-1], colors[-1], RAY_RADIUS)
+        return self._pixels()
+
+    def _compose(self, time: float) -> None:
+        """Put everything that is to be seen at a time into the view."""
         # another painter may have drawn since
         self._gl.make_current()
         for i, trajectory in enumerate(self._trajectories):
@@ -101,6 +136,9 @@ class Painter:
             _add_path(self._view, trajectory, time, pose)
             if len(self._trajectories) > 1:
                 _add_mark(self._view, pose, i)
+
+    def _pixels(self) -> np.ndarray:
+        """The view as a picture `(height, width, 3)`, 0 to 255."""
         mujoco.mjr_render(self._frame, self._view, self._context)
         width, height = self._frame.width, self._frame.height
         picture = np.zeros((height, width, 3), np.uint8)
@@ -200,14 +238,42 @@ def opengl(width: int, height: int) -> Iterator[Any]:
         context.free()
 
 
-def _camera(model: mujoco.MjModel) -> mujoco.MjvCamera:
-    """Make a camera that sees the whole arena."""
+def _camera(model: mujoco.MjModel, aspect: float) -> mujoco.MjvCamera:
+    """Make a camera that sees the box around the walls, and no more than it has to.
+
+    Args:
+        model: of arena and robot.
+        aspect: width of the picture by its height.
+    """
     lower, upper = arena_box(model)
+    middle, half = (lower + upper) / 2, CAMERA_MARGIN * (upper - lower) / 2
+    corners = half * np.array(list(itertools.product((-1, 1), repeat=3)))
+    level, down = np.cos(np.radians(ELEVATION)), np.sin(np.radians(ELEVATION))
+    # in the camera's frame: to the right, up, and away from it
+    axes = [[1, 0, 0], [0, -down, level], [0, level, down]]
+    right, up, away = (corners @ np.transpose(axes)).T
+    height = np.tan(np.radians(model.vis.global_.fovy) / 2)
     camera = mujoco.MjvCamera()
-    # what is near looks larger: a little to the front of the middle
-    camera.lookat[:] = (lower + upper) / 2 - [0, 0.05 * (upper - lower)[1], 0]
+    camera.lookat[:] = middle
     camera.azimuth, camera.elevation = 90.0, ELEVATION
-    camera.distance = np.linalg.norm(upper - lower) * CAMERA_DISTANCE
+    camera.distance = max(
+        np.max(np.abs(right) / (height * aspect) - away),
+        np.max(np.abs(up) / height - away),
+    )
+    return camera
+
+
+def _close_camera(model: mujoco.MjModel, pose: np.ndarray) -> mujoco.MjvCamera:
+    """Make a camera near a robot that sees its front and what is outwards, a wall."""
+    lower, upper = arena_box(model)
+    outwards = pose[:2] - ((lower + upper) / 2)[:2]
+    ahead = np.array([np.cos(pose[2]), np.sin(pose[2])])
+    # a robot in the very middle has no outwards
+    sight = outwards / max(np.linalg.norm(outwards), 1e-9) - AGAINST * ahead
+    camera = mujoco.MjvCamera()
+    camera.lookat[:] = *pose[:2], 0.0
+    camera.azimuth = np.degrees(np.arctan2(sight[1], sight[0]))
+    camera.elevation, camera.distance = CLOSE_ELEVATION, CLOSE_DISTANCE
     return camera
 
 
@@ -227,13 +293,21 @@ def _add_path(
     points[:, :2] = trajectory.pose[: len(points), :2]
     # the step that is going on ends where the robot is
     points[-1, :2] = pose[:2]
-    colors = blend(LOW_FITNESS, HIGH_FITNESS, trajectory.fitness) / 255
+    colors = blend(LOW_FITNESS, HIGH_FITNESS, trajectory.fitness)
+    lines = np.stack([points[:-1], points[1:]], axis=1)
+    _add_lines(view, lines, colors, PATH_RADIUS)
+
+
+def _add_lines(
+    view: mujoco.MjvScene, lines: np.ndarray, colors: np.ndarray, radius: float
+) -> None:
+    """Draw lines `(n, 2, 3)` [m] as capsules in at least `n` colours, 0 to 255."""
     kind = mujoco.mjtGeom.mjGEOM_CAPSULE.value
-    for start, end, color in zip(points[:-1], points[1:], colors, strict=False):
+    for (start, end), color in zip(lines, colors / 255, strict=False):
         geom = view.geoms[view.ngeom]
         rgba = np.array([*color, 1], np.float32)
         mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), rgba)
-        mujoco.mjv_connector(geom, kind, PATH_RADIUS, start, end)
+        mujoco.mjv_connector(geom, kind, radius, start, end)
         view.ngeom += 1
 
 

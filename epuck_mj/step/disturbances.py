@@ -10,12 +10,14 @@ from typing import Self
 import numpy as np
 
 from epuck_mj.constants import (
+    BODY_RADIUS,
     N_PROXIMITY,
     N_WHEELS,
     PROXIMITY_PERIOD,
     TRACK,
     WHEEL_RADIUS,
 )
+from epuck_mj.step.bodies import Bodies
 from epuck_mj.step.calibration import Calibration
 
 
@@ -57,6 +59,12 @@ class Ranges:
         mass: against the robot's own.
         friction: of wheels and floor, against the robot's own.
         latency: control steps until a command has reached the wheels.
+        body_radius: of the shell [m]; the sensors sit on it.
+        set_back: how far behind the shell they sit [m].
+        light: counts of all sensors of a robot, by ambient light and the walls' colour.
+        battery: speed of both wheels, against that of a full battery.
+        slipping: control steps in which the tyres slip at the start of a trial.
+        grip: share of the wheels' speed that the robot moves with in these.
     """
 
     gain: tuple[float, float] = (1.0, 1.0)
@@ -65,6 +73,12 @@ class Ranges:
     mass: tuple[float, float] = (1.0, 1.0)
     friction: tuple[float, float] = (1.0, 1.0)
     latency: tuple[int, int] = (0, 0)
+    body_radius: tuple[float, float] = (BODY_RADIUS, BODY_RADIUS)
+    set_back: tuple[float, float] = (0.0, 0.0)
+    light: tuple[float, float] = (1.0, 1.0)
+    battery: tuple[float, float] = (1.0, 1.0)
+    slipping: tuple[int, int] = (0, 0)
+    grip: tuple[float, float] = (1.0, 1.0)
 
 
 BOOK = Ranges()
@@ -82,6 +96,22 @@ RANGES = Ranges(
 
 Source: gains of JBotEvolver's eight sensors; wheel radii of Webots and of ARGoS, as
 driven; tracks of Enki and of a fit for ROS 2. Mass, friction and latency are chosen.
+"""
+
+ALL_RANGES = replace(
+    RANGES,
+    body_radius=(0.034, 0.037),
+    set_back=(0.0, 0.002),
+    light=(0.8, 1.25),
+    battery=(0.9, 1.0),
+    slipping=(0, 3),
+    grip=(0.0, 1.0),
+)
+"""Ranges of robots that differ in all that real ones differ in.
+
+Source: body radii of the maker and FARSA (35 mm), Webots' guide (35.5), ARGoS in 3D
+(36.2), Webots' model and Enki (37); 34 mm is chosen. Enki's front sensors sit 2 mm
+behind its shell. Nobody has published how light, batteries and starts differ: chosen.
 """
 
 
@@ -103,6 +133,8 @@ class Disturbances:
         mass: of the robot against its own, `(k,)`.
         friction: of its wheels against their own, `(k,)`.
         lag: of its drive's time constants against their own, `(k,)`.
+        wider: how much larger the radius of its shell is than its own [m], `(k,)`.
+        set_back: how much farther behind the shell its sensors are [m], `(k,)`.
     """
 
     of: np.ndarray
@@ -117,6 +149,8 @@ class Disturbances:
     mass: np.ndarray
     friction: np.ndarray
     lag: np.ndarray
+    wider: np.ndarray
+    set_back: np.ndarray
 
     def __post_init__(self) -> None:
         """Refuse arrays that do not belong together."""
@@ -133,6 +167,8 @@ class Disturbances:
             "mass": (k,),
             "friction": (k,),
             "lag": (k,),
+            "wider": (k,),
+            "set_back": (k,),
         }
         for name, shape in expected.items():
             if (got := getattr(self, name).shape) != shape:
@@ -141,6 +177,12 @@ class Disturbances:
     def __len__(self) -> int:
         """Number of trials."""
         return len(self.of)
+
+    @property
+    def bodies(self) -> Bodies:
+        """Bodies of the robots of the trials, `(n,)`."""
+        every = (self.mass, self.friction, self.lag, self.wider, self.set_back)
+        return Bodies(*every)[self.of]
 
     def __getitem__(self, index: np.ndarray | slice) -> Self:
         """The disturbances of some trials, by numpy's indexing."""
@@ -187,7 +229,7 @@ def draw_disturbances(
         ranges: how robots differ.
     """
     low, high = np.log(ranges.gain)
-    return Disturbances(
+    drawn = Disturbances(
         of=np.arange(n),
         # a gain of 2 is as likely as a gain of 1/2
         gains=np.exp(rng.uniform(low, high, (n, N_PROXIMITY))),
@@ -201,7 +243,53 @@ def draw_disturbances(
         mass=rng.uniform(*ranges.mass, n),
         friction=rng.uniform(*ranges.friction, n),
         lag=np.ones(n),
+        wider=np.zeros(n),
+        set_back=np.zeros(n),
     )
+    # drawn last, and only if they differ: the rest stays what it is without them
+    wider = _uniform(rng, ranges.body_radius, n) - BODY_RADIUS
+    set_back = _uniform(rng, ranges.set_back, n)
+    dark, bright = np.log(ranges.light).tolist()
+    light = np.exp(_uniform(rng, (dark, bright), n))
+    battery = _uniform(rng, ranges.battery, n)
+    slipping = rng.integers(ranges.slipping[0], ranges.slipping[1] + 1, n)
+    grip = _uniform(rng, ranges.grip, n)
+    return replace(
+        drawn,
+        gains=drawn.gains * light[:, None],
+        wheel_gains=drawn.wheel_gains * battery[:, None],
+        wheel_noise=with_slipping_start(
+            drawn.wheel_noise, drawn.latency, slipping, grip
+        ),
+        wider=wider,
+        set_back=set_back,
+    )
+
+
+def with_slipping_start(
+    wheel_noise: np.ndarray, latency: np.ndarray, slipping: np.ndarray, grip: np.ndarray
+) -> np.ndarray:
+    """Noise of wheels `(n, steps, 2)` whose tyres slip when a trial begins.
+
+    To the robot, a wheel that slips is one that turns less.
+
+    Args:
+        wheel_noise: without slipping.
+        latency: control steps until the first command has arrived, `(n,)`.
+        slipping: control steps that the tyres slip from then on, `(n,)`.
+        grip: share of the wheels' speed that the robot moves with in these, `(n,)`.
+    """
+    k = np.arange(wheel_noise.shape[1])
+    begins, ends = latency[:, None], (latency + slipping)[:, None]
+    slips = (k >= begins) & (k < ends)
+    less = grip[:, None, None] * (1 + wheel_noise) - 1
+    return np.where(slips[..., None], less, wheel_noise)
+
+
+def _uniform(rng: np.random.Generator, ends: tuple[float, float], n: int) -> np.ndarray:
+    """Numbers `(n,)` between two ends; without a draw if these are the same."""
+    low, high = ends
+    return np.full(n, low) if low == high else rng.uniform(low, high, n)
 
 
 def draw_calibrated(

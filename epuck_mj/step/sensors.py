@@ -28,7 +28,7 @@ class Reading:
     """Reading of a robot at the end of a control step.
 
     Attributes:
-        distance: metres along each proximity ray from the shell, `(..., 8)`;
+        distance: metres along each proximity ray from its sensor, `(..., 8)`;
             negative where nothing was hit, as MuJoCo's rangefinders say it.
         contact: whether the shell touched a wall in the step, however briefly,
             `(...,)`, bool.

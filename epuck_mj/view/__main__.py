@@ -117,6 +117,7 @@ def _evolved_with(champion: Path) -> Conditions | None:
             fields.get("noise", "none"),
             fields.get("randomise", False),
             None if calibration is None else Calibration.from_dict(calibration),
+            fields.get("randomise_all", False),
         )
     except (KeyError, ValueError) as error:
         raise UserError(f"'{config}' is not the config of a run: {error}") from None

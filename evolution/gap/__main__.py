@@ -13,11 +13,13 @@ from epuck_mj.host.command_line import check_threads, main, parse, word
 from epuck_mj.host.files import check_writable, writing
 from epuck_mj.host.limits import check_flag
 from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
+from evolution.gap.slowed import with_slowed
 from evolution.named_policies import policies_of
 
 EXAMPLES = (
     "python -m evolution.gap results/paper --output gap",
     "python -m evolution.gap runs/a runs/b --output gap --worlds 20",
+    "python -m evolution.gap results/paper wall-follower --output gap --speeds 0.04",
 )
 
 
@@ -28,9 +30,10 @@ class GapOptions:
     Attributes:
         paths: run or study directories, controller files, or wall-follower.
         output: folder for gap.md, summary.md, gap.json, gap.csv and figures.
-        worlds: number of worlds.
+        worlds: number of worlds of each kind.
         starts: number of test starts in each world and in the arena of evolution.
         robot: robot that drives; epuck_kinematic and epuck if not given.
+        speeds: drive every policy at these full speeds, too, if it is faster [m/s].
         threads: threads that step the robots; 0 is one per core. Changes no result.
     """
 
@@ -39,6 +42,7 @@ class GapOptions:
     worlds: int = 100
     starts: int = 20
     robot: Annotated[str | None, word("ROBOT")] = None
+    speeds: tuple[float, ...] = ()
     threads: int = 0
 
 
@@ -47,8 +51,10 @@ def measure_gap(argv: Sequence[str]) -> int:
     options = parse(GapOptions, "python -m evolution.gap", argv, examples=EXAMPLES)
     check_flag("worlds", options.worlds)
     check_flag("starts", options.starts, "worlds")
+    for speed in options.speeds:
+        check_flag("speeds", speed, "v_max")
     check_threads(options.threads)
-    policies = policies_of(dict.fromkeys(options.paths))
+    policies = with_slowed(policies_of(dict.fromkeys(options.paths)), options.speeds)
     robots = [options.robot] if options.robot else [KINEMATIC_ROBOT, WHEELED_ROBOT]
     # slow to import
     from evolution.gap.gap_folder import write_gap

@@ -1,55 +1,67 @@
-"""Figure of the gap: in how many worlds policies keep how much fitness."""
+"""Figure of the gap: fitness and crashes of experiments in worlds of each kind."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
 
-from epuck_mj.policies.wall_follower import YARDSTICK
-from evolution.gap.transfer import SHARE_KEPT, Gap
-from evolution.pages.style import PAGE, PRINT, YARDSTICK_LOOK, legend_below, looks
+from epuck_mj.show import colors
+from epuck_mj.show.colors import fraction
+from evolution.gap.transfer import Gap
+from evolution.gap.worlds import KINDS
+from evolution.pages.style import PAGE, PRINT, legend_below
 from evolution.pages.words import robot_name
 
-SHARE_END = 1.2
-"""End of the axis of shares, which may exceed 1."""
+MARKS = (("o", colors.BLUE), ("s", colors.VERMILION), ("^", colors.GREEN))
+"""Marker and colour of each kind of worlds."""
+
+APART = 0.22
+"""Distance of two kinds in the row of an experiment, in rows."""
 
 
-def kept_figure(gap: Gap, names: Mapping[str, str]) -> Figure:
-    """Figure with a panel per robot and a line per experiment.
+def abroad_figure(gaps: Sequence[Gap], names: Mapping[str, str]) -> Figure:
+    """Figure with a row per experiment, and two panels per robot: fitness, crashes.
 
     Args:
-        gap: what was measured.
-        names: of its groups, for readers.
+        gaps: of the same policies, in worlds of each kind.
+        names: of their groups, for readers.
     """
-    styles = looks(group for group in gap.groups if group != YARDSTICK)
+    first = gaps[0]
+    rows = [f"{names[group]} ({len(of)})" for group, of in first.groups.items()]
     with matplotlib.rc_context(PRINT):
-        figure = Figure(figsize=(PAGE, 3.2), layout="constrained")
-        panels = figure.subplots(1, len(gap.transfers), sharey=True, squeeze=False)[0]
+        n = len(first.transfers)
+        height = n * (0.6 + 0.24 * len(rows)) + 0.3
+        figure = Figure(figsize=(PAGE, height), layout="constrained")
+        panels = figure.subplots(n, 2, sharey=True, sharex="col", squeeze=False)
         lines: dict[str, Artist] = {}
-        for axes, (robot, transfer) in zip(panels, gap.transfers.items(), strict=True):
-            for group, members in gap.groups.items():
-                share = np.sort(transfer.share[:, members].ravel())
-                at_least = 1 - np.arange(share.size + 1) / share.size
-                look = styles.get(group)
-                (line,) = axes.step(
-                    [0, *share, SHARE_END],
-                    [1, *at_least],
-                    where="pre",
-                    **YARDSTICK_LOOK
-                    if look is None
-                    else {"color": look.color, "linestyle": look.dashes, "lw": 1.4},
-                )
-                lines[f"{names[group]} (n = {len(members)})"] = line
-            axes.axvline(SHARE_KEPT, color="0.4", lw=0.8, ls=":")
-            axes.set(
-                title=robot_name(robot),
-                xlabel="share of the fitness kept, at least",
-                xlim=(0, SHARE_END),
-                ylim=(0, 1),
-            )
-        panels[0].set_ylabel("share of policies and worlds")
-        # the lines are the same in all panels
+        for k, robot in enumerate(first.transfers):
+            for axes, what, title in (
+                (panels[k, 0], "fitness", "fitness a step"),
+                (panels[k, 1], "crash_rate", "trials that crash"),
+            ):
+                for i, gap in enumerate(gaps):
+                    values = getattr(gap.transfers[robot], what).mean(axis=0)
+                    own = [values[of] for of in gap.groups.values()]
+                    y = np.arange(len(rows)) + APART * (i - (len(gaps) - 1) / 2)
+                    marker, color = MARKS[i]
+                    low, high = ([f(each) for each in own] for f in (np.min, np.max))
+                    axes.hlines(y, low, high, color=fraction(color), lw=0.8)
+                    (line,) = axes.plot(
+                        [np.median(each) for each in own],
+                        y,
+                        linestyle="",
+                        marker=marker,
+                        ms=3.5,
+                        color=fraction(color),
+                    )
+                    lines[KINDS[gap.kind].title] = line
+                axes.set(title=robot_name(robot), xlabel=title, xlim=(0, None))
+        panels[0, 1].xaxis.set_major_formatter(PercentFormatter(1.0))
+        panels[0, 0].set_yticks(range(len(rows)), rows)
+        # the first on top
+        panels[0, 0].set_ylim(len(rows) - 0.5, -0.5)
         legend_below(figure, lines)
     return figure

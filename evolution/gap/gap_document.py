@@ -1,4 +1,7 @@
-"""Document about the gap: a table per robot, and rank correlations."""
+"""Document about the gap: fitness and crashes abroad, what is kept, and ranks."""
+
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -6,28 +9,62 @@ from evolution.gap.transfer import (
     COLLISIONS_MAX,
     SHARE_KEPT,
     Gap,
+    Transfer,
     Verdict,
     between_robots,
     rank_correlations,
     verdict,
 )
+from evolution.gap.worlds import KINDS
 from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
 
 COLUMNS = (
-    *("experiment", "policy", "fitness at home", "kept, mean", "kept, median"),
-    *("collisions per minute", "worlds mastered"),
+    *("experiment", "policy", "fitness", "trials that crash", "fitness at home"),
+    *("kept, mean", "kept, median", "collisions per minute", "worlds mastered"),
 )
-GROUP_COLUMNS = (
-    *("experiment", "full speed", "robot", "n", "fitness at home", "kept"),
+KEPT_COLUMNS = (
+    *("experiment", "robot", "n", "fitness at home", "kept"),
     *("collisions per minute", "worlds mastered", "against home"),
 )
 
 
-def gap_summary(gap: Gap) -> Table:
-    """Table with a row per experiment and robot: medians of its policies' means."""
+def gap_summary(gaps: Sequence[Gap]) -> Table:
+    """Table with a row per experiment and robot: fitness and crashes in the worlds.
+
+    Medians over an experiment's policies of their means.
+
+    Args:
+        gaps: of the same policies in worlds of each kind; the first counts most.
+    """
+    first = gaps[0]
+    rows = []
+    for group, members in first.groups.items():
+        speeds = [s for s, each in first.peers.items() if set(each) & set(members)]
+        for robot, transfer in first.transfers.items():
+            there = [_there(gap.transfers[robot], members) for gap in gaps]
+            own = transfer.home[members], transfer.share[:, members].mean(axis=0)
+            home, kept = (float(np.median(each)) for each in own)
+            n = str(len(members))
+            speed = ", ".join(speeds)
+            rows.append([group, speed, robot, n, *there, f"{home:.3f}", f"{kept:.0%}"])
+    titles = (KINDS[gap.kind].title for gap in gaps)
+    columns = ("experiment", "full speed", "robot", "n", *titles, "at home", "kept")
+    return Table(columns, rows, texts=3)
+
+
+def _there(transfer: Transfer, members: Sequence[int], worlds: Any = ...) -> str:
+    """Fitness and share of crashes of policies in some worlds: `0.352, 7.1%`."""
+    fitness, crashes = (
+        float(np.median(values[worlds][:, members].mean(axis=0)))
+        for values in (transfer.fitness, transfer.crash_rate)
+    )
+    return f"{fitness:.3f}, {crashes:.1%}"
+
+
+def kept_table(gap: Gap) -> Table:
+    """Table of shares kept with a row per experiment and robot, as `gap_summary`."""
     rows = []
     for group, members in gap.groups.items():
-        speeds = [s for s, each in gap.peers.items() if set(each) & set(members)]
         for robot, transfer in gap.transfers.items():
             share, collisions, mastered, against_home = (
                 float(np.median(values[:, members].mean(axis=0)))
@@ -39,73 +76,81 @@ def gap_summary(gap: Gap) -> Table:
                 )
             )
             home = float(np.median(transfer.home[members]))
-            rows.append(
-                [
-                    *(
-                        group,
-                        ", ".join(speeds),
-                        robot,
-                        str(len(members)),
-                        f"{home:.3f}",
-                    ),
-                    *(f"{share:.0%}", f"{collisions:.1f}"),
-                    *(f"{mastered:.0%}", f"{against_home:.0%}"),
-                ]
-            )
-    return Table(GROUP_COLUMNS, rows, texts=3)
+            cells = [group, robot, str(len(members)), f"{home:.3f}", f"{share:.0%}"]
+            shares = [f"{mastered:.0%}", f"{against_home:.0%}"]
+            rows.append([*cells, f"{collisions:.1f}", *shares])
+    return Table(KEPT_COLUMNS, rows, texts=2)
 
 
 def by_latency(gap: Gap) -> Table:
-    """Table of mean shares kept by latency, with a row per experiment and robot."""
+    """Table of fitness and crashes by latency, with a row per experiment and robot."""
     late = np.unique(gap.latency)
     rows = []
     for group, members in gap.groups.items():
         for robot, transfer in gap.transfers.items():
-            kept = [transfer.share[gap.latency == n][:, members].mean() for n in late]
-            shares = (f"{share:.0%}" for share in kept)
-            rows.append([group, robot, str(len(members)), *shares])
+            there = (_there(transfer, members, gap.latency == n) for n in late)
+            rows.append([group, robot, str(len(members)), *there])
     return Table(("experiment", "robot", "n", *map(str, late)), rows, texts=2)
 
 
-def gap_document(gap: Gap) -> list[Block]:
-    """Blocks of the document about the gap."""
+def gap_document(gaps: Sequence[Gap]) -> list[Block]:
+    """Blocks of the document about the gap, in worlds of each kind."""
+    first = gaps[0]
     blocks: list[Block] = [
         Heading("The reality gap", 1),
         Paragraph(
-            f"{len(gap.names)} policies, unchanged, in {gap.latency.size} worlds of a "
-            f"Latin hypercube, on the first {gap.starts} test starts. Home is the "
-            "arena they evolved in, with ideal sensors and motors and as many starts. "
-            f"A policy masters a world if it keeps at least {SHARE_KEPT:.0%} of its "
-            f"fitness and has fewer than {COLLISIONS_MAX:g} collision per minute. "
-            "Kept is the fitness in the world as a share of a reference: the fitness "
-            "at home, or the fitness of an ideal robot in that world's arena if that "
-            "is higher (in a smaller arena, robots find walls sooner). Against home: "
-            "worlds mastered if the reference is always the fitness at home. In "
-            "brackets: 95 % intervals over the worlds. They do not include the spread "
-            "over starts, which are the same in every world."
+            f"{len(first.names)} policies, unchanged, in {first.latency.size} worlds "
+            f"of each kind, drawn as a Latin hypercube, on {first.starts} starts, which "
+            "differ from world to world. In each column: mean step fitness, and the "
+            "share of the trials that end in a crash. Home is the arena that a policy "
+            "evolved in, with ideal sensors and motors and as many test starts. Kept "
+            "is the fitness in the first kind of worlds as a share of the fitness at "
+            "home."
         ),
-        gap_summary(gap),
+        gap_summary(gaps),
         Paragraph(
             "Each number is the median over the policies of an experiment of their "
-            "means. Worlds have the same ranges of wheel radius, track, mass, friction "
-            "and latency as the randomised robots of evolution: policies that evolved "
-            "on randomised robots have met such differences before."
+            "means. Usual worlds share ranges with evolution: those of wheel radius, "
+            "track, mass, friction and latency with randomise, and those of body, "
+            "sensors' place, light, battery and slipping start with randomise_all as "
+            "well. Policies that evolved on such robots have met such differences "
+            "before. In the second kind, every range that can be wider is half as wide "
+            "again. The third kind has the usual ranges, in the arenas "
+            + ", ".join(KINDS["corners"].arenas)
+            + "."
         ),
         Heading("Latency"),
         Paragraph(
-            "Share kept in the worlds where commands reach the wheels this many "
-            "control steps late, mean over worlds and policies."
+            "Fitness and crashes in the usual worlds where commands reach the wheels "
+            "this many control steps late."
         ),
-        by_latency(gap),
+        by_latency(first),
+        Heading("What is kept"),
+        Paragraph(
+            "In the usual worlds. Kept is the fitness in the world as a share of a "
+            "reference: the fitness at home, or the fitness of an ideal robot in that "
+            "world's arena if that is higher (in a smaller arena, robots find walls "
+            "sooner). A slow policy has little to lose. A policy masters a world if it "
+            f"keeps at least {SHARE_KEPT:.0%} and has fewer than {COLLISIONS_MAX:g} "
+            "collision per minute. Against home: worlds mastered if the reference is "
+            "always the fitness at home."
+        ),
+        kept_table(first),
+        Paragraph(
+            "Below, every policy. In brackets, 95 % intervals over the worlds and "
+            "their starts."
+        ),
     ]
-    for robot, transfer in gap.transfers.items():
-        rows = [
-            [group, gap.names[i], *_cells(verdict(transfer, i))]
-            for group, members in gap.groups.items()
-            for i in members
-        ]
-        blocks += [Heading(robot), Table(COLUMNS, rows, texts=2)]
-    return [*blocks, *_ranks(gap)]
+    for gap in gaps:
+        for robot, transfer in gap.transfers.items():
+            rows = [
+                [group, gap.names[i], *_cells(verdict(transfer, i))]
+                for group, members in gap.groups.items()
+                for i in members
+            ]
+            title = f"{robot}, {KINDS[gap.kind].title}"
+            blocks += [Heading(title), Table(COLUMNS, rows, texts=2)]
+    return [*blocks, *_ranks(first)]
 
 
 def _ranks(gap: Gap) -> list[Block]:
@@ -142,8 +187,11 @@ def _ranks(gap: Gap) -> list[Block]:
 
 
 def _cells(found: Verdict) -> list[str]:
-    share, collisions, mastered = found.share, found.collisions, found.mastered
+    fitness, crashes, share = found.fitness, found.crash_rate, found.share
+    collisions, mastered = found.collisions, found.mastered
     return [
+        f"{fitness.value:.3f} [{fitness.low:.3f}, {fitness.high:.3f}]",
+        f"{crashes.value:.1%} [{crashes.low:.1%}, {crashes.high:.1%}]",
         f"{found.home:.3f}",
         f"{share.value:.2f} [{share.low:.2f}, {share.high:.2f}]",
         f"{found.median_share:.2f}",

@@ -2,27 +2,32 @@
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 from tqdm import tqdm
 
 from epuck_mj.host.files import write_text, writing
-from evolution.gap.figure import kept_figure
+from evolution.gap.figure import abroad_figure
 from evolution.gap.gap_document import gap_document, gap_summary
 from evolution.gap.groups import experiments, labels, peers
 from evolution.gap.outcomes import Outcome, abroad, ideal
 from evolution.gap.transfer import Gap, Transfer, verdict
-from evolution.gap.worlds import World, worlds
+from evolution.gap.worlds import KINDS, World, worlds
 from evolution.named_policies import NamedPolicy
 from evolution.pages.blocks import to_markdown
 from evolution.pages.csv_text import csv_text
 from evolution.pages.figure_files import write_figure
 
-Measured = tuple[list[Outcome], list[list[Outcome]], list[list[Outcome]]]
-"""Outcomes at home, on ideal robots in each world's arena, and in each world."""
+Places = Mapping[str, Sequence[World]]
+"""Worlds by their kind."""
+
+Measured = dict[str, tuple[list[Outcome], list[list[Outcome]], list[list[Outcome]]]]
+"""For each kind of worlds, outcomes at home, on ideal robots in each world's arena, and
+in each world."""
 
 
 def write_gap(
@@ -39,14 +44,14 @@ def write_gap(
         folder: an existing one.
         policies: who is tested.
         robots: that drive.
-        n_worlds: how many.
+        n_worlds: how many of each kind.
         starts: test starts in each world, and at home.
         threads: threads that step the robots; 0 is one per core.
 
     Raises:
         UserError: if a robot or an arena cannot be used, or a file not be written.
     """
-    places = worlds(n_worlds)
+    places = {kind: worlds(n_worlds, kind) for kind in KINDS}
     measured = {
         robot: _measured(policies, places, robot, starts, threads) for robot in robots
     }
@@ -55,84 +60,101 @@ def write_gap(
 
 def _measured(
     policies: Sequence[NamedPolicy],
-    places: Sequence[World],
+    places: Places,
     robot: str,
     n: int,
     threads: int,
 ) -> Measured:
     home = ideal(policies, robot, n, threads)
+    everywhere = [place for each in places.values() for place in each]
     arenas = {
         arena: ideal(policies, robot, n, threads, arena)
-        for arena in dict.fromkeys(place.arena for place in places)
+        for arena in dict.fromkeys(place.arena for place in everywhere)
     }
-    outcomes = abroad(policies, places, robot, n, threads)
     bar = tqdm(
-        outcomes,
-        total=len(places),
+        abroad(policies, everywhere, robot, n, threads),
+        total=len(everywhere),
         unit="world",
         desc=robot,
         disable=not sys.stderr.isatty(),
     )
-    return home, [arenas[place.arena] for place in places], list(bar)
+    outcomes = iter(bar)
+    return {
+        kind: (
+            home,
+            [arenas[place.arena] for place in each],
+            list(islice(outcomes, len(each))),
+        )
+        for kind, each in places.items()
+    }
 
 
 def _write(
     folder: Path,
     policies: Sequence[NamedPolicy],
-    places: Sequence[World],
-    measured: dict[str, Measured],
+    places: Places,
+    measured: Mapping[str, Measured],
     starts: int,
 ) -> None:
-    transfers = {robot: Transfer.of(*outcomes) for robot, outcomes in measured.items()}
-    gap = Gap(
-        names=[policy.name for policy in policies],
-        transfers=transfers,
-        groups=experiments(policies),
-        peers=peers(policies),
-        starts=starts,
-        latency=np.array([place.latency for place in places]),
-    )
+    gaps = [
+        Gap(
+            kind=kind,
+            names=[policy.name for policy in policies],
+            transfers={
+                robot: Transfer.of(*outcomes[kind])
+                for robot, outcomes in measured.items()
+            },
+            groups=experiments(policies),
+            peers=peers(policies),
+            starts=starts,
+            latency=np.array([place.latency for place in own]),
+        )
+        for kind, own in places.items()
+    ]
     record = {
-        "worlds": [asdict(world) for world in places],
         "starts": starts,
+        "worlds": {
+            kind: [asdict(world) for world in own] for kind, own in places.items()
+        },
         "robots": {
             robot: {
-                policy.name: {
-                    **asdict(verdict(transfers[robot], i)),
-                    "ideal": [world[i].fitness for world in outcomes[1]],
-                    "abroad": [asdict(world[i]) for world in outcomes[2]],
+                gap.kind: {
+                    policy.name: {
+                        **asdict(verdict(gap.transfers[robot], i)),
+                        "ideal": [world[i].fitness for world in outcomes[gap.kind][1]],
+                        "abroad": [asdict(world[i]) for world in outcomes[gap.kind][2]],
+                    }
+                    for i, policy in enumerate(policies)
                 }
-                for i, policy in enumerate(policies)
+                for gap in gaps
             }
             for robot, outcomes in measured.items()
         },
     }
     with writing():
         write_text(folder / "gap.json", json.dumps(record, indent=1) + "\n")
-        write_text(folder / "gap.csv", _rows(policies, places, transfers))
-        write_text(folder / "gap.md", to_markdown(gap_document(gap)))
-        write_text(folder / "summary.md", to_markdown([gap_summary(gap)]))
-    names = labels(policies, gap.groups)
-    write_figure(kept_figure(gap, names), folder, "gap")
+        write_text(folder / "gap.csv", _rows(places, gaps))
+        write_text(folder / "gap.md", to_markdown(gap_document(gaps)))
+        write_text(folder / "summary.md", to_markdown([gap_summary(gaps)]))
+    names = labels(policies, gaps[0].groups)
+    write_figure(abroad_figure(gaps, names), folder, "gap")
 
 
-def _rows(
-    policies: Sequence[NamedPolicy],
-    places: Sequence[World],
-    transfers: dict[str, Transfer],
-) -> str:
-    """Rows of gap.csv, one per robot, policy and world."""
+def _rows(places: Places, gaps: Sequence[Gap]) -> str:
+    """Rows of gap.csv, one per kind of worlds, robot, policy and world."""
     rows = [
         {
             "robot": robot,
-            "policy": policy.name,
-            "world": j,
+            "policy": name,
+            "fitness": f"{transfer.fitness[j, i]:.4f}",
+            "crash_rate": f"{transfer.crash_rate[j, i]:.4f}",
             "share": f"{transfer.share[j, i]:.4f}",
             "collisions_per_minute": f"{transfer.collisions[j, i]:.4f}",
             **asdict(world),
         }
-        for robot, transfer in transfers.items()
-        for i, policy in enumerate(policies)
-        for j, world in enumerate(places)
+        for gap in gaps
+        for robot, transfer in gap.transfers.items()
+        for i, name in enumerate(gap.names)
+        for j, world in enumerate(places[gap.kind])
     ]
     return csv_text(list(rows[0]), rows)

@@ -1,4 +1,4 @@
-"""Groups of policies: of one experiment, or of one speed."""
+"""Groups of policies: of one experiment at one speed, or of one speed."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -11,16 +11,19 @@ from evolution.study.directory import PREFIX
 
 
 def experiments(policies: Sequence[NamedPolicy]) -> dict[str, list[int]]:
-    """Policies by experiment, named by its path if experiments share a name."""
-    places: dict[Path, list[int]] = {}
+    """Policies by experiment, named by its path if experiments share a name.
+
+    Those that are driven slower than they evolved are groups of their own.
+    """
+    places: dict[tuple[Path, str], list[int]] = {}
     for i, policy in enumerate(policies):
         path = Path(policy.source)
         place = path.parent if path.name.startswith(PREFIX) else path
-        places.setdefault(place, []).append(i)
-    names = Counter(place.name for place in places)
+        places.setdefault((place, policy.variant), []).append(i)
+    names = Counter(place.name for place in {place for place, _ in places})
     return {
-        place.name if names[place.name] == 1 else place.as_posix(): members
-        for place, members in places.items()
+        _with(place.name if names[place.name] == 1 else place.as_posix(), variant): of
+        for (place, variant), of in places.items()
     }
 
 
@@ -28,12 +31,18 @@ def labels(
     policies: Sequence[NamedPolicy], groups: Mapping[str, Sequence[int]]
 ) -> dict[str, str]:
     """Names for readers of the groups that `experiments` found."""
-    return {
-        group: YARDSTICK_LABEL
-        if group == YARDSTICK
-        else experiment_label(group, policies[members[0]].config)
-        for group, members in groups.items()
-    }
+    found = {}
+    for group, members in groups.items():
+        policy = policies[members[0]]
+        plain = group.removesuffix(policy.variant).rstrip()
+        name = experiment_label(plain, policy.config)
+        name = YARDSTICK_LABEL if plain == YARDSTICK else name
+        found[group] = _with(name, policy.variant)
+    return found
+
+
+def _with(name: str, variant: str) -> str:
+    return f"{name} {variant}".rstrip()
 
 
 def peers(policies: Sequence[NamedPolicy]) -> dict[str, list[int]]:

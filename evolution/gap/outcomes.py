@@ -10,7 +10,7 @@ from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import Everybody
 from epuck_mj.trials.recorder import record_tracks
 from epuck_mj.trials.tracks import Tracks
-from evolution.gap.worlds import World, met
+from evolution.gap.worlds import World, met, starts_in
 from evolution.judging.held_out_starts import starts_for_test
 from evolution.named_policies import NamedPolicy
 
@@ -74,11 +74,11 @@ def abroad(
     n: int,
     threads: int,
 ) -> Iterator[list[Outcome]]:
-    """Outcomes of all policies in each world, on `n` test starts.
+    """Outcomes of all policies in each world, on `n` starts of its own.
 
     They all meet the same robot and the same noise; a trial lasts as long as at home.
     """
-    for index, world in enumerate(worlds):
+    for world in worlds:
         scene, period = _scene(world, robot)
         robots = robots_in(scene, n, threads)
         # slow, and the same for most policies
@@ -88,13 +88,13 @@ def abroad(
             duration = policy.task.steps * policy.task.control_step
             steps = max(1, round(duration / period))
             task = replace(policy.task, steps=steps, control_step=period)
-            starts = starts_for_test(free(scene, policy.start_clearance), n)
+            starts = starts_in(world, free(scene, policy.start_clearance), n)
             tracks = record_tracks(
                 robots,
                 Everybody(policy.policy),
                 starts,
                 task,
-                met(world, index, n, steps),
+                met(world, n, steps),
             )
             outcomes.append(_outcome(tracks, period))
         yield outcomes

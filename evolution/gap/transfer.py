@@ -1,4 +1,4 @@
-"""Transfer of champions: shares kept, collisions and ranks, with uncertainties."""
+"""Transfer of champions: fitness, crashes, shares kept, ranks, with uncertainties."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -31,12 +31,14 @@ class Transfer:
             arena, where walls are soon found, would hide what sensors and motors cost.
         fitness: mean step fitness in each world, `(w, p)`.
         collisions: per minute, `(w, p)`.
+        crash_rate: share of the trials that ended in a crash, `(w, p)`.
     """
 
     home: np.ndarray
     reference: np.ndarray
     fitness: np.ndarray
     collisions: np.ndarray
+    crash_rate: np.ndarray
 
     @classmethod
     def of(
@@ -59,6 +61,7 @@ class Transfer:
             np.maximum(own, there),
             np.array([[o.fitness for o in world] for world in abroad]),
             np.array([[o.collisions_per_minute for o in world] for world in abroad]),
+            np.array([[o.crash_rate for o in world] for world in abroad]),
         )
 
     @property
@@ -82,9 +85,10 @@ class Transfer:
 
 @dataclass(frozen=True, eq=False)
 class Gap:
-    """Policies in the same worlds on each robot.
+    """Policies in the same worlds of one kind on each robot.
 
     Attributes:
+        kind: of the worlds, a name in `worlds.KINDS`.
         names: of the policies.
         transfers: by robot, at least one.
         groups: indices of the policies of each experiment.
@@ -93,6 +97,7 @@ class Gap:
         latency: of each world, in control steps, `(w,)`.
     """
 
+    kind: str
     names: Sequence[str]
     transfers: Mapping[str, Transfer]
     groups: Mapping[str, Sequence[int]]
@@ -107,6 +112,8 @@ class Verdict:
 
     Attributes:
         home: mean step fitness at home.
+        fitness: mean step fitness in the worlds.
+        crash_rate: mean share of the trials there that ended in a crash.
         share: mean share kept over the worlds.
         median_share: median over the worlds.
         collisions: mean per minute over the worlds.
@@ -114,6 +121,8 @@ class Verdict:
     """
 
     home: float
+    fitness: Interval
+    crash_rate: Interval
     share: Interval
     median_share: float
     collisions: Interval
@@ -126,6 +135,8 @@ def verdict(transfer: Transfer, policy: int) -> Verdict:
     share, mastered = transfer.share[:, policy], transfer.mastered[:, policy]
     return Verdict(
         home=float(transfer.home[policy]),
+        fitness=mean_interval(transfer.fitness[:, policy], rng),
+        crash_rate=mean_interval(transfer.crash_rate[:, policy], rng),
         share=mean_interval(share, rng),
         median_share=float(np.median(share)),
         collisions=mean_interval(transfer.collisions[:, policy], rng),

@@ -42,6 +42,15 @@ LABELS: Mapping[str, str] = {
 PAPERS = ("de-best", "de-rand", "ga")
 """The experiments of the paper."""
 
+PAPER_BEST = {"de-best": 246.66, "de-rand": 215.217, "ga": 202.775}
+"""Maximum fitness of each algorithm. Source: the paper, section 5."""
+
+REPLICATES = 3
+"""Number of runs of which the paper reports the best.
+
+The paper says "at least three". Of more runs, a low best would be even rarer.
+"""
+
 ROBOT_NAMES: Mapping[str, str] = {
     "epuck_kinematic": "kinematic robot",
     "epuck": "wheeled robot",

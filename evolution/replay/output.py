@@ -59,7 +59,7 @@ def show(options: Options, replay: Replay, path: str) -> None:
         replay.save(options.save)
         print(f"{options.save}; watch it: {shell_command('rerun', options.save)}")
     if options.image is not None:
-        _draw(options.image, replay.scene, trajectories)
+        _draw(options.image, replay)
         print(options.image)
     if options.video is not None:
         _film(options.video, replay.scene, trajectories)
@@ -91,15 +91,16 @@ def _make_folder(path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
 
 
-def _draw(path: Path, scene: Scene, trajectories: Sequence) -> None:
+def _draw(path: Path, replay: Replay) -> None:
     # OpenGL and matplotlib are slow to import
-    from epuck_mj.show.pictures import save_pixels
-    from epuck_mj.show.render import painter
+    from epuck_mj.show.pictures import save_figure
+    from epuck_mj.show.still import DPI, still
 
     _make_folder(path)
-    with painter(scene, trajectories, *IMAGE_SIZE) as artist:
-        pixels = artist.picture()
-    save_pixels(pixels, path)
+    trajectories = [trial.trajectory for trial in replay.trials]
+    sensor_range = replay.trials[0].task.sensor_range
+    figure = still(replay.scene, trajectories, sensor_range, IMAGE_SIZE)
+    save_figure(figure, path, DPI)
 
 
 def _film(path: Path, scene: Scene, trajectories: Sequence) -> None:

@@ -19,12 +19,14 @@ import tyro
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse, word
-from epuck_mj.host.files import write_bytes, writing
 from evolution.replay.viewer import viewer_binary
 from evolution.replay.web import free_ports
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
+
+TOP_BAR = 36
+"""Height of the viewer's menu [pixels], with its warnings of a computer without GPU."""
 
 VIEWER_PATIENCE = 60.0
 """How long the viewer may take for each request [s]."""
@@ -35,6 +37,8 @@ Value = TypeVar("Value")
 @dataclass(frozen=True)
 class ViewerPictureOptions:
     """Write a picture of a recording in the rerun viewer, without opening a window.
+
+    The bar with the viewer's menu is cut off.
 
     Attributes:
         recording: recording of trials (.rrd).
@@ -127,12 +131,14 @@ def picture_viewer(argv: Sequence[str]) -> int:
     options = parse(
         ViewerPictureOptions, "python -m evolution.replay.viewer_picture", argv
     )
+    # not for those who only ask for help
+    from epuck_mj.show.pictures import save_below
+
     if not options.recording.is_file():
         raise UserError(f"no recording '{options.recording}'")
     with headless_viewer(options.recording, options.size) as client:
-        pixels = viewer_screenshot(client, options.time)
-    with writing():
-        write_bytes(options.output, pixels)
+        shot = viewer_screenshot(client, options.time)
+    save_below(shot, TOP_BAR, options.output)
     return 0
 
 

@@ -9,7 +9,9 @@ import numpy as np
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.pages.words import (
     LABELS,
+    PAPER_BEST,
     PAPERS,
+    REPLICATES,
 )
 from evolution.report.samples import FOLLOWED, known
 from evolution.report.sections.comparisons import (
@@ -30,13 +32,13 @@ from evolution.reproduce.verdicts import (
     NOT_MEASURED,
     OTHER_STUDY,
     TOO_FEW,
-    chance_of_order,
     of_best,
     of_most,
     of_order,
 )
 from evolution.settings.comparison import differences
 from evolution.settings.config import ExperimentConfig
+from evolution.statistics.best_of_few import chance_of_order
 from evolution.statistics.significance import (
     FEWEST_FOR_STARS,
     LEVELS,
@@ -46,15 +48,6 @@ from evolution.study.data import StudyData
 
 PAPER = "paper"
 """The shipped study whose experiments are the paper's."""
-
-PAPER_BEST = {"de-best": 246.66, "de-rand": 215.217, "ga": 202.775}
-"""Maximum fitness of each algorithm. Source: the paper, section 5."""
-
-REPLICATES = 3
-"""Number of runs of which the paper reports the best.
-
-The paper says "at least three". With more runs, a low best would be even rarer.
-"""
 
 NEAR_READINGS = (
     ("lenient", 2 / 3, "two thirds"),

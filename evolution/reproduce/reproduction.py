@@ -17,6 +17,7 @@ from evolution.pages.blocks import (
 )
 from evolution.pages.words import (
     PAPERS,
+    REPLICATES,
     SPREAD,
     label,
     median_and_quartiles,
@@ -26,7 +27,6 @@ from evolution.report.measures import shown_robots
 from evolution.report.samples import believed_on, kept, most_believed_fitness
 from evolution.reproduce.claim import Claim
 from evolution.reproduce.claims import (
-    REPLICATES,
     claims,
     held_out_order,
     held_out_pairs,

@@ -6,13 +6,13 @@ every run needs a Wilson interval on one side of one half. The best of the paper
 runs needs a rank among ours that is not too extreme.
 """
 
-from collections.abc import Sequence
-from math import comb, floor
+from math import floor
 
 import numpy as np
 
 from evolution.pages.words import probability
 from evolution.report.sections.comparisons import Comparison
+from evolution.statistics.best_of_few import chance_of_best
 from evolution.statistics.estimates import wilson
 from evolution.statistics.significance import FEWEST_FOR_STARS, LEVELS
 
@@ -67,39 +67,6 @@ def of_best(sample: np.ndarray, best: float, replicates: int) -> tuple[str, str]
     if p < LEVELS[0]:
         return ours, INCONSISTENT
     return ours, NOT_CONTRADICTED if above else UNDECIDED
-
-
-def chance_of_best(sample: np.ndarray, best: float, replicates: int) -> float:
-    """Two-sided probability that the best of other runs ranks as extreme among ours.
-
-    If all runs are alike, theirs and ours are in any order with the same probability.
-    """
-    above, n = int((sample > best).sum()), sample.size
-
-    def at_least(k: int) -> float:
-        """Probability that `k` or more of our runs exceed all other runs."""
-        return comb(n + replicates - k, replicates) / comb(n + replicates, replicates)
-
-    at_most = 1 - at_least(above + 1) if above < n else 1.0
-    return min(1.0, 2 * min(at_least(above), at_most))
-
-
-def chance_of_order(samples: Sequence[np.ndarray], replicates: int) -> float:
-    """Probability that the best of some runs of each sample have the samples' order.
-
-    Runs are drawn with replacement from samples `(n,)`; equal bests have no order.
-
-    Args:
-        samples: of three experiments, in the expected order, the highest best first.
-        replicates: runs drawn of each.
-    """
-    first, second, third = (np.sort(sample) for sample in samples)
-    ranks = np.arange(second.size + 1) / second.size
-    # the distribution of the best of the second's draws over its values
-    best = np.diff(ranks**replicates)
-    above = np.searchsorted(first, second, side="right") / first.size
-    below = np.searchsorted(third, second, side="left") / third.size
-    return float((best * (1 - above**replicates) * below**replicates).sum())
 
 
 def fewest_to_contradict(replicates: int) -> int:

@@ -106,6 +106,12 @@ class ExperimentConfig(BaseModel):
     randomise: StrictBool = Field(
         False, description="give each trial a different robot; needs noise"
     )
+    randomise_all: StrictBool = Field(
+        False,
+        description="give each trial a robot that differs in all that real ones differ "
+        "in: as randomise, and in the body's radius, the place of the sensors, light, "
+        "battery and a slipping start; needs noise",
+    )
     calibration: CalibrationConfig = Field(
         None,
         description="file written by python -m epuck_mj.calibrate, or its keys: use "
@@ -176,7 +182,9 @@ class ExperimentConfig(BaseModel):
     @property
     def conditions(self) -> Conditions:
         """Noise, randomisation and calibration of the robots."""
-        return Conditions(self.noise, self.randomise, self.calibration)
+        return Conditions(
+            self.noise, self.randomise, self.calibration, self.randomise_all
+        )
 
     @property
     def task(self) -> TaskParameters:

@@ -8,12 +8,13 @@ from evolution.pages.blocks import Block, Heading, Paragraph, Picture, Table
 from evolution.pages.words import (
     LABELS,
     NOTHING,
+    PAPER_BEST,
     PAPERS,
+    REPLICATES,
     numbered,
     probability,
     spread,
 )
-from evolution.reproduce.claims import PAPER_BEST, REPLICATES
 from evolution.statistics.significance import FEWEST_FOR_STARS
 from evolution.variations.change_words import in_words
 from evolution.variations.varied import UNCHANGED, Order, Varied

@@ -7,10 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from epuck_mj.scene.model_files import WHEELED_ROBOT
-from evolution.pages.words import PAPERS
+from evolution.pages.words import (
+    PAPER_BEST,
+    PAPERS,
+    REPLICATES,
+)
 from evolution.report.sections.comparisons import MARGIN
-from evolution.reproduce.claims import PAPER_BEST, REPLICATES
-from evolution.reproduce.verdicts import chance_of_best, chance_of_order
+from evolution.statistics.best_of_few import chance_of_best, chance_of_order
 from evolution.statistics.equivalence import Equivalence, equivalence
 from evolution.statistics.significance import (
     FEWEST_FOR_STARS,

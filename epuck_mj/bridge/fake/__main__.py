@@ -122,8 +122,6 @@ def _refuse_bad_options(options: Options) -> None:
         raise UserError("expected one of --link, --tcp and --wifi")
     if options.journal is not None:
         check_writable(options.journal)
-    if not ports and sys.platform == "win32":
-        raise UserError("this system has no pseudo-terminals: use --tcp")
     if not 0 < options.speed <= 1000:
         raise UserError(f"expected --speed above 0, up to 1000, got {options.speed}")
     if not 0 <= options.latency <= 1:

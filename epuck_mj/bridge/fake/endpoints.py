@@ -8,7 +8,7 @@ import contextlib
 import os
 import select
 import socket
-import tty
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -54,6 +54,13 @@ class Pty:
 
     def open(self) -> None:
         """Make the robot's port appear."""
+        try:
+            # not on Windows
+            import tty
+        except ImportError:
+            raise UserError(
+                "this system has no pseudo-terminals: use --tcp PORT"
+            ) from None
         self._master, self._slave = os.openpty()
         # nothing is echoed or changed, even before a host says so
         tty.setraw(self._slave)
@@ -108,7 +115,11 @@ class Tcp:
         self.is_open = False
         try:
             self.open()
-        except (OSError, OverflowError) as error:
+        except OverflowError:
+            raise UserError(
+                f"cannot listen on port {port}: expected one from 0 to 65535"
+            ) from None
+        except OSError as error:
             raise UserError(f"cannot listen on port {port}: {error}") from None
 
     @property
@@ -199,7 +210,12 @@ def serve(
     try:
         while wanted():
             pause = BUSY_TIME if emulator.busy else IDLE_TIME
-            ready = select.select(endpoint.handles(), [], [], pause)[0]
+            ready = []
+            if handles := endpoint.handles():
+                ready = select.select(handles, [], [], pause)[0]
+            else:
+                # Windows refuses to select among nothing
+                time.sleep(pause)
             heard = endpoint.receive() if ready else b""
             now = clock()
             said = emulator.exchange(heard, now)

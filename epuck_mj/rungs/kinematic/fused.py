@@ -32,11 +32,18 @@ from epuck_mj.rungs.kinematic.kernel import (
     Y,
     exp,
     move,
+    rays_of,
     sense,
 )
 from epuck_mj.rungs.kinematic.plan import Plan, plan_of
-from epuck_mj.rungs.kinematic.robots import at_rest, lags, substeps
+from epuck_mj.rungs.kinematic.robots import (
+    at_rest,
+    own_numbers,
+    room_for,
+    substeps,
+)
 from epuck_mj.scene.model import Scene
+from epuck_mj.step.bodies import Bodies
 from epuck_mj.step.control import TaskParameters, Trials
 from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.step.fitness import SPACED_FAR, SPACED_NEAR
@@ -191,7 +198,7 @@ def trial(
     drivers: Drivers,
     i,
     states,
-    lag,
+    own,
     needed,
 ):
     """One trial: fitness, control steps, whether it crashed.
@@ -205,7 +212,7 @@ def trial(
         drivers: policies of all trials.
         i: number of the trial among these.
         states: of all robots on their starts, `(n, N_STATE)`; changed.
-        lag: of their wheels, `(n, 4)`.
+        own: numbers of their bodies, `(n, N_OWN)`.
         needed: fitness that it has to reach to matter; the trial ends when it cannot.
     """
     truth, before = np.empty(N_PROXIMITY), np.empty(N_PROXIMITY)
@@ -215,7 +222,7 @@ def trial(
     neurons = np.empty(drivers.hidden.shape[2])
     delay = noise.latency[which] if noise.there else task.late
     sent = np.zeros((delay + 1, 2))
-    body, rays = plan.body, plan.rays
+    body, (rays, edge) = plan.body, rays_of(plan, own, i)
     limit = body.speed_max * (SPARE_SPEED if noise.there else 1.0)
     grid, first, near, sides, ellipses = plan.solid
     seen_grid, seen_first, seen_near, seen_sides, seen_ellipses = plan.seen
@@ -225,7 +232,7 @@ def trial(
     turn_gain = noise.turn_gain[which]
     sense(
         rays,
-        body.shell,
+        edge,
         task.reach,
         seen_grid,
         seen_first,
@@ -285,7 +292,7 @@ def trial(
             ellipses,
             states,
             i,
-            lag,
+            own,
             left,
             right,
             task.n_substeps,
@@ -295,7 +302,7 @@ def trial(
             return fitness, k + 1, True
         sense(
             rays,
-            body.shell,
+            edge,
             task.reach,
             seen_grid,
             seen_first,
@@ -340,7 +347,7 @@ def trials(
     of,
     drivers: Drivers,
     states,
-    lag,
+    own,
     first,
     last,
     per_individual,
@@ -359,7 +366,7 @@ def trials(
         of: which of the disturbances each trial meets, `(n,)`.
         drivers: policies of all trials.
         states: of the robots on their starts, `(n, N_STATE)`; changed.
-        lag: of their wheels, `(n, 4)`.
+        own: numbers of their bodies, `(n, N_OWN)`.
         first: individual.
         last: individual, which is not among them.
         per_individual: trials of each.
@@ -384,7 +391,7 @@ def trials(
                 drivers,
                 i,
                 states,
-                lag,
+                own,
                 needed,
             )
             total += fitness[i]
@@ -408,7 +415,7 @@ class FusedTrials:
         """
         self._scene, self._task, self._late = scene, task, late
         self._threads = threads or os.cpu_count() or 1
-        self._plans: dict[float, Plan] = {}
+        self._plans: dict[tuple[float, float], Plan] = {}
 
     def __call__(
         self,
@@ -458,13 +465,12 @@ class FusedTrials:
         n, time = len(starts), self._task.control_step
         noise, of = _noise(disturbances, n, time)
         reach = self._task.sensor_range
-        mass, slow = np.ones((2, n))
+        bodies = Bodies.own(n)
         if disturbances is not None:
-            reach = max(reach, PROXIMITY_REACH)
-            mass, slow = disturbances.mass[of], disturbances.lag[of]
-        plan = self._plan(reach)
+            reach, bodies = max(reach, PROXIMITY_REACH), disturbances.bodies
+        plan = self._plan(reach, room_for(bodies))
         task = self._compiled_task(reach)
-        states, lag = at_rest(starts), lags(plan, mass, slow, time)
+        states, own = at_rest(starts), own_numbers(plan, bodies, time)
         fitness, steps = np.zeros(n), np.zeros(n, np.int64)
         crashed = np.zeros(n, bool)
 
@@ -477,7 +483,7 @@ class FusedTrials:
                 of,
                 drivers,
                 states,
-                lag,
+                own,
                 *part,
                 per_individual,
                 to_beat,
@@ -494,10 +500,11 @@ class FusedTrials:
                 list(pool.map(run, parts))
         return Trials(fitness, steps, crashed)
 
-    def _plan(self, reach: float) -> Plan:
-        if reach not in self._plans:
-            self._plans[reach] = plan_of(self._scene, reach, self._task.control_step)
-        return self._plans[reach]
+    def _plan(self, reach: float, wider: float) -> Plan:
+        if (reach, wider) not in self._plans:
+            step = self._task.control_step
+            self._plans[reach, wider] = plan_of(self._scene, reach, step, wider)
+        return self._plans[reach, wider]
 
     def _compiled_task(self, reach: float) -> Task:
         speeds = self._task.speeds

@@ -27,6 +27,9 @@ from epuck_mj.step.elementary import (
 # columns of a robot's state
 X, Y, YAW, COS, SIN, AHEAD, AROUND, N_STATE = range(8)
 
+# columns of a robot's own numbers
+LEFT_AHEAD, TIME_AHEAD, LEFT_AROUND, TIME_AROUND, RADIUS, OUTWARD, N_OWN = range(7)
+
 
 @compiled(forceinline=True)
 def exp(x):
@@ -188,6 +191,20 @@ def sense(
 
 
 @compiled(forceinline=True)
+def rays_of(plan: Plan, own, i):
+    """Rays of robot `i`, `(4, n)`, whose sensors may be elsewhere; and their reach.
+
+    Nothing is farther from the axle than the second number where a ray begins [m].
+    """
+    outward = own[i, OUTWARD]
+    rays = plan.rays.copy()
+    for k in range(rays.shape[1]):
+        rays[0, k] += outward * rays[2, k]
+        rays[1, k] += outward * rays[3, k]
+    return rays, plan.body.shell + max(outward, 0.0)
+
+
+@compiled(forceinline=True)
 def move(
     body: Body,
     grid: Grid,
@@ -197,7 +214,7 @@ def move(
     ellipses,
     state,
     i,
-    lags,
+    own,
     left,
     right,
     n_substeps,
@@ -214,9 +231,7 @@ def move(
         ellipses: likewise.
         state: of all robots, `(n, N_STATE)`; changed.
         i: number of the robot.
-        lags: of all robots, `(n, 4)`: the share of the speeds' difference to the
-            command that is left after a substep, and its time [s] that counts for the
-            way in it; ahead, then around.
+        own: numbers of all robots, `(n, N_OWN)`; see `robots.own_numbers`.
         left: commanded speed of the left wheel [rad/s].
         right: of the right wheel.
         n_substeps: number of substeps.
@@ -226,11 +241,12 @@ def move(
     turn = 2.0 * body.wheel_radius / body.track
     x, y, cos, sin = state[i, X], state[i, Y], state[i, COS], state[i, SIN]
     u, w, yaw = state[i, AHEAD], state[i, AROUND], state[i, YAW]
-    left_ahead, time_ahead = lags[i, 0], lags[i, 1]
-    left_around, time_around = lags[i, 2], lags[i, 3]
+    left_ahead, time_ahead = own[i, LEFT_AHEAD], own[i, TIME_AHEAD]
+    left_around, time_around = own[i, LEFT_AROUND], own[i, TIME_AROUND]
+    radius = own[i, RADIUS]
     cell, touched = cell_of(grid, x, y), False
     # how far it can go before it may touch anything
-    free = distance_to(first, near, sides, ellipses, cell, x, y) - body.shell
+    free = distance_to(first, near, sides, ellipses, cell, x, y) - radius
     for _ in range(n_substeps):
         way = body.wheel_radius * (ahead * substep + (u - ahead) * time_ahead)
         angle = turn * (around * substep + (w - around) * time_around)
@@ -249,7 +265,7 @@ def move(
         yaw += angle
         free -= abs(way)
         if free <= ROUNDING:
-            free = distance_to(first, near, sides, ellipses, cell, x, y) - body.shell
+            free = distance_to(first, near, sides, ellipses, cell, x, y) - radius
             if free <= 0.0:
                 touched = True
                 break
@@ -266,7 +282,7 @@ ROUNDING = 1e-12
 
 @compiled()
 def step_all(
-    plan: Plan, states, lags, commands, n_substeps, substep, reach, distance, contact
+    plan: Plan, states, own, commands, n_substeps, substep, reach, distance, contact
 ):
     """One control step of robots `(n, N_STATE)`; fills `(n, 8)` and `(n,)`."""
     grid, first, near, sides, ellipses = plan.solid
@@ -280,35 +296,39 @@ def step_all(
             ellipses,
             states,
             i,
-            lags,
+            own,
             commands[i, 0],
             commands[i, 1],
             n_substeps,
             substep,
         )
-    sense_all(plan, states, reach, distance)
+    sense_all(plan, states, own, reach, distance)
 
 
 @compiled()
-def touch_all(plan: Plan, states, contact):
+def touch_all(plan: Plan, states, own, contact):
     """Whether robots `(n, N_STATE)` touch a wall where they stand; fills `(n,)`."""
     grid, first, near, sides, ellipses = plan.solid
     for i in range(states.shape[0]):
         x, y = states[i, X], states[i, Y]
         cell = cell_of(grid, x, y)
         far = distance_to(first, near, sides, ellipses, cell, x, y)
-        contact[i] = far <= plan.body.shell
+        contact[i] = far <= own[i, RADIUS]
 
 
 @compiled()
-def sense_all(plan: Plan, states, reach, distance):
-    """What robots `(n, N_STATE)` sense where they stand; fills `(n, 8)`."""
+def sense_all(plan: Plan, states, own, reach, distance):
+    """What robots `(n, N_STATE)` sense where they stand; fills `(n, 8)`.
+
+    Of their own numbers `(n, N_OWN)` only OUTWARD counts.
+    """
     grid, first, near, sides, ellipses = plan.seen
-    rays, length = plan.rays, np.empty(plan.rays.shape[1])
+    length = np.empty(plan.rays.shape[1])
     for i in range(states.shape[0]):
+        rays, shell = rays_of(plan, own, i)
         sense(
             rays,
-            plan.body.shell,
+            shell,
             reach,
             grid,
             first,

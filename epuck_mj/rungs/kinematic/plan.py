@@ -102,13 +102,16 @@ class Plan(NamedTuple):
     solid: Walls
 
 
-def plan_of(scene: Scene, reach: float, control_step: float) -> Plan:
+def plan_of(
+    scene: Scene, reach: float, control_step: float, wider: float = 0.0
+) -> Plan:
     """The plan of a scene.
 
     Args:
         scene: robot and arena.
         reach: farthest that rays have to see [m].
         control_step: its duration [s].
+        wider: how much larger radii of shells there may be than the robot's [m].
 
     Raises:
         UserError: if the robot or a geom of the arena cannot be put into a plan.
@@ -121,8 +124,8 @@ def plan_of(scene: Scene, reach: float, control_step: float) -> Plan:
         rays,
         lag,
         massless,
-        _walls(*_outlines(scene, False), body.shell + reach),
-        _walls(*_outlines(scene, True), body.shell + way),
+        _walls(*_outlines(scene, False), body.shell + wider + reach),
+        _walls(*_outlines(scene, True), body.shell + wider + way),
     )
 
 

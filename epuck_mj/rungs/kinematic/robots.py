@@ -8,8 +8,15 @@ from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.rungs.bodies import SPARE_SPEED
 from epuck_mj.rungs.kinematic.kernel import (
     COS,
+    LEFT_AHEAD,
+    LEFT_AROUND,
+    N_OWN,
     N_STATE,
+    OUTWARD,
+    RADIUS,
     SIN,
+    TIME_AHEAD,
+    TIME_AROUND,
     YAW,
     X,
     sense_all,
@@ -17,13 +24,17 @@ from epuck_mj.rungs.kinematic.kernel import (
     touch_all,
 )
 from epuck_mj.rungs.kinematic.plan import SUBSTEP, Plan, plan_of
-from epuck_mj.scene.clearance import ClearanceProbe
+from epuck_mj.scene.clearance import ClearanceProbe, beside_wider
 from epuck_mj.scene.model import Scene
+from epuck_mj.step.bodies import Bodies
 from epuck_mj.step.elementary import cos_sin, exp
 from epuck_mj.step.sensors import Reading
 
 ENDLESS = 1e6
 """Reach of rays that see all there is [m]."""
+
+ROOM = 0.005
+"""Multiple of which plans have room for wider bodies [m]: few plans for all robots."""
 
 
 class KinematicRobots:
@@ -44,10 +55,10 @@ class KinematicRobots:
         self._threads = threads
         self._time = scene.n_substeps * scene.model.opt.timestep
         self._plan = plan_of(scene, ENDLESS, self._time)
-        self._mass, self._lag = np.ones((2, capacity))
+        self._bodies, self._room = Bodies.own(capacity), 0.0
         self._spare = 1.0
         self._states = np.zeros((0, N_STATE))
-        self._lags = np.zeros((0, 4))
+        self._numbers = np.zeros((0, N_OWN))
 
     def reset(self, starts: np.ndarray) -> Reading:
         """Put a robot at rest on each start `(robots, 3)`: x, y [m], yaw [rad].
@@ -61,10 +72,10 @@ class KinematicRobots:
             )
         self._states = at_rest(starts)
         n = len(starts)
-        self._lags = lags(self._plan, self._mass[:n], self._lag[:n], self._time)
+        self._numbers = own_numbers(self._plan, self._bodies[:n], self._time)
         distance, contact = _empty(n)
-        touch_all(self._plan, self._states, contact)
-        sense_all(self._plan, self._states, ENDLESS, distance)
+        touch_all(self._plan, self._states, self._numbers, contact)
+        sense_all(self._plan, self._states, self._numbers, ENDLESS, distance)
         return Reading(distance, contact)
 
     def step(self, command: np.ndarray) -> Reading:
@@ -80,7 +91,7 @@ class KinematicRobots:
         step_all(
             self._plan,
             self._states,
-            self._lags,
+            self._numbers,
             np.clip(command, -most, most),
             *substeps(self._time),
             ENDLESS,
@@ -93,16 +104,16 @@ class KinematicRobots:
         """See `Robots.restart`."""
         states = at_rest(starts)
         self._states[which] = states
-        mass, lag = self._mass[which], self._lag[which]
-        self._lags[which] = lags(self._plan, mass, lag, self._time)
+        own = own_numbers(self._plan, self._bodies[which], self._time)
+        self._numbers[which] = own
         distance, contact = _empty(len(states))
-        touch_all(self._plan, states, contact)
-        sense_all(self._plan, states, ENDLESS, distance)
+        touch_all(self._plan, states, own, contact)
+        sense_all(self._plan, states, own, ENDLESS, distance)
         return Reading(distance, contact)
 
     def keep(self, mask: np.ndarray) -> None:
         """Keep only the active robots that `mask` `(active,)` selects."""
-        self._states, self._lags = self._states[mask], self._lags[mask]
+        self._states, self._numbers = self._states[mask], self._numbers[mask]
 
     def poses(self) -> np.ndarray:
         """Poses of the active robots, `(active, 3)`: x, y [m], yaw [rad]."""
@@ -112,24 +123,20 @@ class KinematicRobots:
 
     def clearances(self) -> np.ndarray:
         """Distances from the active robots to the nearest wall [m], `(active,)`."""
-        return self._probe.measure(self.poses()).distance
+        wider = self._numbers[:, RADIUS] - self._plan.body.shell
+        return beside_wider(self._probe.measure(self.poses()).distance, wider)
 
-    def embody(
-        self,
-        mass: np.ndarray,
-        friction: np.ndarray,
-        lag: np.ndarray,
-        which: np.ndarray | None = None,
-    ) -> None:
+    def embody(self, bodies: Bodies, which: np.ndarray | None = None) -> None:
         """See `Simulator.embody`; wheels that roll have no friction to lose."""
-        ids = slice(len(mass)) if which is None else which
-        self._mass[ids], self._lag[ids] = mass, lag
+        self._bodies.put(slice(len(bodies)) if which is None else which, bodies)
         self._spare = SPARE_SPEED
+        if (room := room_for(bodies)) > self._room:
+            self._plan = plan_of(self.scene, ENDLESS, self._time, room)
+            self._room = room
 
     def disembody(self) -> None:
         """See `Simulator.disembody`."""
-        self._mass, self._spare = np.ones(self.capacity), 1.0
-        self._lag = np.ones(self.capacity)
+        self._bodies, self._spare = Bodies.own(self.capacity), 1.0
 
     @cached_property
     def _probe(self) -> ClearanceProbe:
@@ -156,19 +163,31 @@ def substeps(control_step: float) -> tuple[int, float]:
     return n, control_step / n
 
 
-def lags(
-    plan: Plan, mass: np.ndarray, lag: np.ndarray, control_step: float
-) -> np.ndarray:
-    """What `kernel.move` needs to know of the lags of robots, `(n, 4)`.
+def room_for(bodies: Bodies) -> float:
+    """Room that a plan needs for the widest of some bodies [m]."""
+    widest = max(bodies.wider.max(initial=0), bodies.outward.max(initial=0))
+    return ROOM * float(np.ceil(widest / ROOM))
+
+
+def own_numbers(plan: Plan, bodies: Bodies, control_step: float) -> np.ndarray:
+    """What the kernel needs to know of the bodies of robots, `(n, N_OWN)`.
+
+    Of the speeds ahead and around, the share of the difference to the command that is
+    left after a substep, and its time [s] that counts for the way in it; the radius of
+    the shell and how far outward the sensors are [m].
 
     Args:
-        plan: of a robot whose mass and lag are 1.
-        mass: against that robot's, `(n,)`.
-        lag: of the time constants, likewise.
+        plan: of a robot that bodies differ from.
+        bodies: of the robots, `(n,)`.
         control_step: its duration [s].
     """
     _, substep = substeps(control_step)
-    own = plan.massless + mass[:, None] * (plan.lag - plan.massless)
-    own = lag[:, None] * own
-    left = exp(-substep / own)
-    return np.stack([left, (1.0 - left) * own], axis=-1).reshape(-1, 4)
+    time = plan.massless + bodies.mass[:, None] * (plan.lag - plan.massless)
+    time = bodies.lag[:, None] * time
+    left = exp(-substep / time)
+    own = np.empty((len(bodies), N_OWN))
+    own[:, [LEFT_AHEAD, LEFT_AROUND]] = left
+    own[:, [TIME_AHEAD, TIME_AROUND]] = (1.0 - left) * time
+    own[:, RADIUS] = plan.body.shell + bodies.wider
+    own[:, OUTWARD] = bodies.outward
+    return own

@@ -7,7 +7,8 @@ from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.scene.geometry import kinematics, moving_bodies
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.robot_parts import ROBOT_BODY
-from epuck_mj.show.colors import FAINT, HIGH_FITNESS, LOW_FITNESS, VERMILION, blend
+from epuck_mj.show.colors import HIGH_FITNESS, LOW_FITNESS, VERMILION, blend
+from epuck_mj.show.rays import ray_lines
 from epuck_mj.show.recording.entities import EARNED, SENSED, Entities, columns
 from epuck_mj.show.recording.shapes import body_name
 from epuck_mj.trials.trajectory import Trajectory
@@ -29,7 +30,7 @@ def log_motion(
     """Log a trajectory in space; bodies and rays in world coordinates."""
     model = scene.model
     now = columns(trajectory, SENSED)
-    position, quaternion, origin, direction = kinematics(scene, trajectory.pose)
+    position, quaternion, *_ = kinematics(scene, trajectory.pose)
     for body in moving_bodies(model):
         poses = rr.Transform3D.columns(
             translation=position[:, body],
@@ -46,17 +47,13 @@ def log_motion(
     )
     stream.send_columns(place.path, columns(trajectory, EARNED), path)
 
-    # a free ray ends where the sensor's range ends
-    distance = trajectory.distance
-    length = np.where(distance < 0, sensor_range, distance)
-    length = np.minimum(length, sensor_range)[..., None]
-    rays = np.stack([origin, origin + length * direction], axis=2, dtype=np.float32)
+    lines, colors = ray_lines(scene, trajectory, sensor_range)
     ends = rr.LineStrips3D.columns(
-        strips=rays.reshape(-1, 2, 3),
-        colors=blend(VERMILION, FAINT, trajectory.observation.ravel()),
-        radii=np.full(distance.size, 0.001),
+        strips=lines.reshape(-1, 2, 3).astype(np.float32),
+        colors=colors.reshape(-1, 3),
+        radii=np.full(colors.size // 3, 0.001),
     )
-    counts = np.full(len(distance), N_PROXIMITY)
+    counts = np.full(len(lines), N_PROXIMITY)
     stream.send_columns(place.rays, now, ends.partition(counts))
 
     if trajectory.crashed:

@@ -19,8 +19,11 @@ FLOOR_THICKNESS = 0.002
 """Thickness of planes, as drawn [m]."""
 
 
-MARK_HEIGHT = 0.085
-"""Height of a robot's coloured mark above the robot [m]."""
+MARK_HEIGHT, LABEL_HEIGHT = 0.085, 0.25
+"""Heights of a robot's coloured mark and of its name [m]: the name hides no robot."""
+
+LABEL_COLOR = (255, 255, 255)
+"""Colour of a name, which rerun writes on dark grey."""
 
 
 def log_arena(stream: rr.RecordingStream, model: mujoco.MjModel) -> None:
@@ -44,9 +47,15 @@ def log_robot(
             [(0, 0, MARK_HEIGHT)],
             radii=[0.01],
             colors=[place.color],
-            labels=[place.name],
         )
         stream.log(f"{place.body(ROBOT_BODY)}/mark", mark, static=True)
+        label = rr.Points3D(
+            [(0, 0, LABEL_HEIGHT)],
+            radii=[0.0],
+            colors=[LABEL_COLOR],
+            labels=[place.name],
+        )
+        stream.log(f"{place.body(ROBOT_BODY)}/name", label, static=True)
 
 
 def body_name(model: mujoco.MjModel, body: int) -> str:
