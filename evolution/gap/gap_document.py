@@ -103,9 +103,9 @@ def gap_document(gaps: Sequence[Gap]) -> list[Block]:
             f"of each kind, drawn as a Latin hypercube, on {first.starts} starts, "
             "which differ from world to world. In each column: mean step fitness, and "
             "the share of the trials that end in a crash. Home is the arena that a "
-            "policy evolved in, with ideal sensors and motors and as many test starts. Kept "
-            "is the fitness in the first kind of worlds as a share of the fitness at "
-            "home."
+            "policy evolved in, with ideal sensors and motors and as many test starts. "
+            "Kept is the fitness in the first kind of worlds as a share of the fitness "
+            "at home."
         ),
         gap_summary(gaps),
         Paragraph(
