@@ -286,8 +286,8 @@ def test_a_study_is_shipped_or_a_file(here):
         message = refused(find_study, name)
         assert message.startswith(f"no study '{name}'")
         assert message.endswith(
-            "one of climbing, good-robot, hybrids, paper, quick, steps-150, "
-            "steps-500, transfer, variations, wheels"
+            "one of climbing, good-robot, hybrids, paper, quick, real-robots, "
+            "steps-150, steps-500, transfer, variations, wheels"
         )
 
 

@@ -49,7 +49,7 @@ class Options:
 
     Attributes:
         study: a shipped study (paper, variations, steps-150, steps-500, climbing,
-            hybrids, good-robot, wheels, transfer, quick) or a YAML file.
+            hybrids, good-robot, wheels, transfer, real-robots, quick) or a YAML file.
         output: study directory.
         seeds: seeds of the runs, such as 1-30 or 1,3,5-8.
         experiments: names of the experiments to run, separated by commas; all if not
