@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from epuck_mj.rungs.kinematic import fused, kernel
+from epuck_mj.rungs.kinematic import kernel, noise
 from epuck_mj.rungs.kinematic.compiling import compiled
 from epuck_mj.step import elementary
 
@@ -74,5 +74,5 @@ def test_interpolation_is_numpy_s_and_the_compiled_one_is_the_same():
     x = np.concatenate([RNG.uniform(-0.5, 1.5, 2000), xs])
     expected = elementary.interpolate(x, xs, ys)
     np.testing.assert_allclose(expected, np.interp(x, xs, ys), rtol=1e-13, atol=1e-13)
-    one = np.array([fused.interpolate(value, xs, ys) for value in x])
+    one = np.array([noise.interpolate(value, xs, ys) for value in x])
     np.testing.assert_array_equal(one, expected)

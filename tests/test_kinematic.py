@@ -17,7 +17,7 @@ from epuck_mj.policies.network import Controller, Network
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.disturbed import disturbed
 from epuck_mj.rungs.kinematic import compiling
-from epuck_mj.rungs.kinematic.fused import FITNESS, FusedTrials
+from epuck_mj.rungs.kinematic.fused import FusedTrials
 from epuck_mj.rungs.kinematic.kernel import (
     COS,
     N_OWN,
@@ -29,6 +29,7 @@ from epuck_mj.rungs.kinematic.kernel import (
 )
 from epuck_mj.rungs.kinematic.plan import plan_of
 from epuck_mj.rungs.kinematic.robots import ENDLESS, KinematicRobots, at_rest, substeps
+from epuck_mj.rungs.kinematic.whole_trial import FITNESS
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.rungs.table import compiled_trials, robots_in
 from epuck_mj.scene.clearance import CLEARANCE_MAX, ClearanceProbe

@@ -7,8 +7,8 @@ from epuck_mj.constants import BODY_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.wall_follower import WallFollower
-from epuck_mj.rungs.kinematic.fused import FITNESS
 from epuck_mj.rungs.kinematic.plan import plan_of
+from epuck_mj.rungs.kinematic.whole_trial import FITNESS
 from epuck_mj.rungs.late import with_late_commands
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.changed_robots import (

@@ -13,8 +13,9 @@ from epuck_mj.policies.network import Controller, Network
 from epuck_mj.policies.topology import FEEDFORWARD, NETWORKS, Topology, topology_from
 from epuck_mj.rungs.disturbed import disturbed
 from epuck_mj.rungs.kinematic.drivers import drivers_of
-from epuck_mj.rungs.kinematic.fused import FITNESS, FusedTrials
+from epuck_mj.rungs.kinematic.fused import FusedTrials
 from epuck_mj.rungs.kinematic.robots import KinematicRobots
+from epuck_mj.rungs.kinematic.whole_trial import FITNESS
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.conditions import Conditions
@@ -237,7 +238,7 @@ def test_a_run_is_the_same_on_any_engine_and_its_champion_drives(
     for ideal, ways in (
         ("", ("--threads 1", "--no-racing --threads 2")),
         (
-            "--noise none --no-randomise --robot epuck ",
+            "--noise none --no-randomise-all --robot epuck ",
             ("--threads 1", "--engine dm_control"),
         ),
     ):

@@ -53,7 +53,8 @@ def compiled_trials(
     """
     if scene.name != KINEMATIC_ROBOT:
         return None
-    from epuck_mj.rungs.kinematic.fused import FITNESS, FusedTrials
+    from epuck_mj.rungs.kinematic.fused import FusedTrials
+    from epuck_mj.rungs.kinematic.whole_trial import FITNESS
 
     if task.fitness not in FITNESS:
         return None

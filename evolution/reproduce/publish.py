@@ -21,8 +21,8 @@ from evolution.variations.__main__ import report_variations
 REPORTED = ("paper", "wheels")
 """Studies that are reported: folders of runs/ and results/, and names of tables."""
 
-TRANSFER = "transfer"
-"""Study of evolution with real sensors and motors, which the gap measures."""
+TRANSFER, REAL_ROBOTS = "transfer", "real-robots"
+"""Studies of evolution with real sensors and motors, which the gap measures."""
 
 VARIATIONS = ("variations", "steps-150", "steps-500")
 """Studies of the paper's algorithms with one thing changed at a time."""
@@ -30,12 +30,15 @@ VARIATIONS = ("variations", "steps-150", "steps-500")
 HYBRIDS, GOOD_ROBOT = "hybrids", "good-robot"
 """Studies of evolution that learns, and of the experiment `best`; they have a page."""
 
+OTHERS = (TRANSFER, REAL_ROBOTS, HYBRIDS, GOOD_ROBOT)
+"""All that are not reported."""
+
 PAGES: Mapping[str, tuple[str, ...]] = {
     "README.md": ("medians",),
     "docs/champions.md": ("champions",),
     "docs/findings.md": ("paper", "wheels"),
     "docs/variations.md": ("variations",),
-    "docs/transfer.md": ("gap",),
+    "docs/transfer.md": ("gap", REAL_ROBOTS),
     "docs/hybrids.md": (HYBRIDS, GOOD_ROBOT),
 }
 """Pages that show results, and the names of their tables."""
@@ -55,7 +58,7 @@ def publish(argv: Sequence[str]) -> int:
     parse(
         PublishOptions, "python -m evolution.reproduce.publish", argv, PublishOptions()
     )
-    for name in (*REPORTED, TRANSFER, HYBRIDS, GOOD_ROBOT, *VARIATIONS):
+    for name in (*REPORTED, *OTHERS, *VARIATIONS):
         if (Path("runs") / name).is_dir():
             ship(Path("runs") / name, Path("results") / name)
     paper, *others = (str(path) for path in shipped(Path("results")))
@@ -135,6 +138,7 @@ def _tables(results: Path) -> dict[str, str]:
     from evolution.hybrids.hybrids_page import worth_table
     from evolution.pages.blocks import to_markdown
     from evolution.reproduce.champions_table import champions_table
+    from evolution.reproduce.real_robots_table import real_robots_table
     from evolution.reproduce.reproduction import medians_table, runs_table
     from evolution.study.data import load_study
     from evolution.variations.variations_page import orders_table
@@ -146,11 +150,16 @@ def _tables(results: Path) -> dict[str, str]:
         tables[name] = to_markdown([runs_table(study)])
         if name == REPORTED[0]:
             tables["medians"] = to_markdown([medians_table(study, WHEELED_ROBOT)])
-    for path in (results / TRANSFER, results / HYBRIDS, results / GOOD_ROBOT):
-        if path.is_dir():
-            studies.append(load_study(path))
-            if path.name != TRANSFER:
-                tables[path.name] = to_markdown([worth_table(studies[-1])])
+    table_of = {
+        REAL_ROBOTS: real_robots_table,
+        HYBRIDS: worth_table,
+        GOOD_ROBOT: worth_table,
+    }
+    for name in OTHERS:
+        if (results / name).is_dir():
+            studies.append(load_study(results / name))
+            if name in table_of:
+                tables[name] = to_markdown([table_of[name](studies[-1])])
     tables["champions"] = to_markdown([champions_table(studies)])
     if varied := _variations(results):
         found = orders(varied_of([load_study(path) for path in varied]))
