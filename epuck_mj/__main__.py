@@ -24,7 +24,7 @@ def listing(commands: dict[str, str]) -> str:
 
 
 def show(argv: Sequence[str]) -> int:
-    """Show the commands; the exit status."""
+    """Show the commands and return the exit status."""
     print(listing(COMMANDS))
     return 0
 

@@ -240,7 +240,7 @@ With the age of a reading before it and the log after it, less than 2 s.
 """
 
 PURSUIT_TIME = 5.0
-"""How long a robot that nobody could stop is told so by another process [s]. Chosen."""
+"""How long another process goes on telling a robot to stop [s]. Chosen."""
 
 STOP_REPLY_TIME = 0.2
 """Time without an answer after which a robot is told to stop again [s]. Chosen."""

@@ -6,7 +6,7 @@
 import importlib
 from typing import TYPE_CHECKING, Any
 
-# first of all: it prepares commands for what may happen while they load
+# first, because it handles errors and signals while commands load
 import epuck_mj  # noqa: F401
 
 if TYPE_CHECKING:

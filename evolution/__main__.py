@@ -32,7 +32,7 @@ def script() -> None:
 
 
 def _command(argv: Sequence[str]) -> int:
-    """Run a command, or show all; the exit status.
+    """Run a command, or show all commands; return the exit status.
 
     Raises:
         UserError: if there is no such command.
@@ -53,7 +53,7 @@ def _command(argv: Sequence[str]) -> int:
 
 
 def show(argv: Sequence[str]) -> int:
-    """Show the commands; the exit status."""
+    """Show the commands and return the exit status."""
     print(listing(COMMANDS | ROBOT_COMMANDS))
     return 0
 

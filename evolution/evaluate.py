@@ -66,7 +66,7 @@ class Options:
 
 
 def evaluate_policies(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     check_flag("starts", options.starts)
     check_threads(options.threads)
@@ -75,7 +75,7 @@ def evaluate_policies(argv: Sequence[str]) -> int:
     conditions = options.robots.conditions or Conditions()
     if options.json is not None:
         files.check_writable(options.json)
-    # simulators are for a command that makes sense
+    # simulators are slow to import: after the checks of the command line
     from evolution.judging.held_out import Judges, tested_on
 
     judges = Judges(options.threads)

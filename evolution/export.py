@@ -38,7 +38,7 @@ class Options:
 
 
 def export(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(Options, "python -m evolution.export", argv, examples=EXAMPLES)
     files.check_writable(options.file)
     if options.file.suffix in CONFIG:

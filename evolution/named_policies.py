@@ -218,7 +218,7 @@ def _plain(policy: NamedPolicy) -> str:
 def _scores(scores: KnownScores) -> Iterator[str]:
     """Lines of Markdown, one per known score."""
     for fitness, title in (
-        (scores.stored, "Stored fitness, what evolution believed"),
+        (scores.stored, "Stored fitness, from its trials in evolution"),
         (scores.validation, "On validation starts, where the champion was chosen"),
     ):
         if not math.isnan(fitness):

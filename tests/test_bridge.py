@@ -420,7 +420,7 @@ def test_a_robot_that_dies(tmp_path, at_each_line):
     assert done.returncode == 4
     error = done.stderr
     assert error.startswith("error: THE MOTORS MAY STILL TURN, switch the robot off")
-    assert "Details: expected the robot to say that it stopped; came none" in error
+    assert "Details: expected the robot to say that it stopped; got none" in error
     assert "Connection refused" in error
     assert error.count("\n") == 1
     assert Trajectory.load(tmp_path / "log.npz").steps > 0

@@ -522,7 +522,7 @@ def test_a_robot_that_stalls_its_motors(kinematic, output, capsys, monkeypatch):
     assert world.calibrate(output, "straight", verbose=True) == 3
     error = capsys.readouterr().err
     assert "the motors turned too slowly, or not at all, so it was stopped" in error
-    assert "Details: expected 4000 steps in 32 s; came 0" in error
+    assert "Details: expected 4000 steps in 32 s; got 0" in error
     assert world.body.standing
 
 

@@ -292,7 +292,7 @@ def test_the_champion_file_holds_every_score(written):
         for robot, judge in judges_of(experiment.config).items()
     }
     assert list(tests) == ["epuck", "epuck_kinematic"]
-    # what evolution believed in most, on the robot that it climbed to
+    # the individual with the highest stored fitness, on the robot it climbed to
     genome, believed = most_believed(stored_by(experiment))
     robot = "epuck" if experiment.climbed else "epuck_kinematic"
     judge = judges_of(experiment.config)[robot]
@@ -369,7 +369,7 @@ def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
     )
     assert other.in_lines(20.0).splitlines()[-1] == (
         "The highest fitness that evolution stored was 9.0, of an individual that "
-        "fresh starts give 3.0"
+        "earns 3.0 on fresh starts"
     )
     # of an unknown maximum nothing is said
     assert " of 20" not in scores.in_lines(None)

@@ -343,7 +343,7 @@ def test_a_straight_drive_shows_no_track(tmp_path):
 
 def test_a_robot_that_stands_shows_nothing(tmp_path):
     trajectory = driven(another_robot(1), 10, ahead(0.0))
-    message = r"nothing of the robot can be told.*rolled 0\.00 m, and 0 readings"
+    message = r"drive shows nothing about the robot.*rolled 0\.00 m, and 0 readings"
     with pytest.raises(UserError, match=message):
         found_in(trajectory, tmp_path)
 
@@ -404,7 +404,7 @@ def test_a_wrong_start_is_noticed(a_drive, tmp_path):
     ("arena", "message"),
     [
         ("small_square", "expected readings that fit the arena"),
-        ("corridor", "expected readings that fit the arena|in one piece"),
+        ("corridor", "expected readings that fit the arena|without jumps"),
         ("nowhere", "no arena 'nowhere'"),
     ],
 )
@@ -434,7 +434,7 @@ def test_a_robot_that_no_e_puck_is(a_drive, tmp_path):
     trajectory, _ = a_drive
     assert trajectory.motor_steps is not None
     other = dataclasses.replace(trajectory, motor_steps=trajectory.motor_steps // 2)
-    message = "no e-puck|in one piece|radius of the left wheel"
+    message = "not an e-puck|without jumps|radius of the left wheel"
     with pytest.raises(UserError, match=message):
         found_in(other, tmp_path)
 

@@ -391,5 +391,5 @@ def test_bad_parts_are_refused_in_one_line(flags, message, here):
 def test_a_network_that_acts_otherwise_in_a_crowd_is_found(here):
     crowded = "(weights + len(genomes) * 1e-3) @"
     (here / "bad.py").write_text(BAD.replace("weights @", crowded))
-    with pytest.raises(UserError, match="acts otherwise alone than among others"):
+    with pytest.raises(UserError, match="acts differently alone and among others"):
         check_network("bad.py:Product")

@@ -23,7 +23,7 @@ def kinds(kind: type[BridgeError] = BridgeError) -> list[type[BridgeError]]:
 @pytest.mark.parametrize("kind", kinds())
 def test_every_failure_says_what_happened_and_what_to_try(kind):
     error = kind("a", b"b")
-    assert str(error) == "expected a; came b'b'"
+    assert str(error) == "expected a; got b'b'"
     text = told(error, verbose=False, done=STOPPED)
     happened, done, advice = text.partition(", so it was stopped and stands still. ")
     assert done
@@ -62,7 +62,7 @@ def test_a_runaway_says_what_came_before():
     )
     assert told_of_runaway(caught.value, verbose=False) == warning
     assert told_of_runaway(caught.value, verbose=True) == (
-        f"{warning} Details: expected a stop; came none; at first: {lost}"
+        f"{warning} Details: expected a stop; got none; at first: {lost}"
     )
     alone = told_of_runaway(StillMoving("a stop", "none"), verbose=False)
     assert alone == f"{warning.partition(';')[0]}."

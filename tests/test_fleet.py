@@ -168,7 +168,7 @@ def test_members_at_ports():
         ("a/b: {port: p, controller: c}", "'a/b': expected a name of at most 20"),
         ("..: {port: p, controller: c}", "'..': expected a name of at most 20"),
         ("1: {port: p, controller: c}", "robot 1: expected a name of at most 20"),
-        ("a: {port: p, port: q, controller: c}", "key 'port' stands twice"),
+        ("a: {port: p, port: q, controller: c}", "key 'port' appears twice"),
         ("a: &x {port: p, controller: c}\nb: *x", "a and b have the same port"),
         (
             "a: {port: p, controller: c}\nA: {port: q, controller: c}",

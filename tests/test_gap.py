@@ -339,7 +339,7 @@ def test_the_document_says_who_kept_what():
     transfers, peers_of = {"epuck": TRANSFER}, {"0.1 m/s": [0, 1, 2]}
     gap = Gap("usual", names, transfers, groups, peers_of, 5, LATENCY)
     text = to_markdown(gap_document([gap, replace(gap, kind="corners")]))
-    assert "3 policies, frozen, in 4 worlds" in text
+    assert "3 policies, unchanged, in 4 worlds" in text
     titles = "| n | usual worlds | outer corners and posts | at home | kept |"
     assert titles in text
     # fitness 0.3525 and 0.35, crashes in none and in 9.4 % of the trials

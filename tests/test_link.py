@@ -113,7 +113,7 @@ def test_a_battery_that_nobody_tells():
 
 def test_no_reply_ends_in_time_and_out_of_step():
     link, script = linked()
-    with pytest.raises(NoReply, match=r"b \(battery\) in time; came nothing"):
+    with pytest.raises(NoReply, match=r"b \(battery\) in time; got nothing"):
         link.ask(ascii.battery_query())
     assert script.now == pytest.approx(0.3, abs=0.02)
     assert not link.in_step
@@ -132,7 +132,7 @@ def test_until_is_sooner_than_patience():
 
 def test_a_lost_byte_is_not_waited_for():
     link, script = linked((0.02, b"\x2c\x01\xff"))
-    with pytest.raises(NoReply, match=r"came b',\\x01\\xff'"):
+    with pytest.raises(NoReply, match=r"got b',\\x01\\xff'"):
         link.ask(CYCLE)
     assert script.now < 0.1
 
@@ -180,7 +180,7 @@ def test_resync_does_not_take_an_older_barrier_for_its_own():
 
 def test_resync_gives_up_in_time():
     link, script = linked()
-    with pytest.raises(NoReply, match="an e-puck that answers V; came nothing"):
+    with pytest.raises(NoReply, match="an e-puck that answers V; got nothing"):
         link.resync(2.0)
     assert 2.0 <= script.now < 2.1
     assert not link.in_step
@@ -189,7 +189,7 @@ def test_resync_gives_up_in_time():
 def test_resync_with_a_device_that_never_is_silent():
     link, script = linked()
     script.receive = lambda timeout: setattr(script, "now", script.now + 0.01) or b"$GP"
-    with pytest.raises(NoReply, match=r"came b'\$GP"):
+    with pytest.raises(NoReply, match=r"got b'\$GP"):
         link.resync(2.0)
     assert script.now < 2.1
 

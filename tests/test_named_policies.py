@@ -219,7 +219,7 @@ def test_labels_are_short_and_tell_apart():
 def test_what_is_known_of_a_policy_is_described(evolved, tmp_path):
     text = described(named_policies(str(evolved), "1")[0])
     assert text.startswith(f"## {evolved} generation 1\n")
-    assert "what evolution believed: " in text
+    assert "from its trials in evolution: " in text
     assert load_config(evolved / "config.yaml").to_yaml() in text
     held_out = {
         "epuck": {"mean": 212.25, "starts": 1000, "crash_rate": 0.125},
@@ -257,5 +257,5 @@ def test_false_scores_are_refused(tmp_path, scores):
 
 def test_scores_that_are_known_are_said_beside_unknown_ones(tmp_path):
     text = described(of_a_person(tmp_path, {"stored": 240}))
-    assert "- Stored fitness, what evolution believed: 240.0\n" in text
+    assert "- Stored fitness, from its trials in evolution: 240.0\n" in text
     assert "validation" not in text

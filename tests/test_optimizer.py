@@ -261,7 +261,7 @@ class Forgetful(RandomSearch):
 
 
 def test_who_has_not_a_property_is_told_which():
-    with pytest.raises(UserError, match="not so: a resumed search goes on"):
+    with pytest.raises(UserError, match="does not hold: a resumed search goes on"):
         check_optimizer("tests.test_optimizer:Forgetful")
     check_optimizer("genetic_algorithm", population=12)
 

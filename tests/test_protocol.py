@@ -264,7 +264,7 @@ def test_wrong_replies_raise(request_, came):
     found = outcome(request_, [came])
     assert isinstance(found, BridgeError)
     assert "expected" in str(found)
-    assert "came" in str(found)
+    assert "got" in str(found)
 
 
 @pytest.mark.parametrize(
@@ -329,13 +329,13 @@ def test_the_check_sees_a_byte_too_many_or_too_few(place, extra, counts, steps):
     ],
 )
 def test_what_the_robot_would_do_otherwise_is_refused(call):
-    with pytest.raises(UserError, match=r"expected .*; came"):
+    with pytest.raises(UserError, match=r"expected .*; got"):
         call()
 
 
 def test_errors_are_short_and_say_both():
     error = BridgeError("a thing", b"x" * 1000)
-    assert str(error) == f"expected a thing; came b'{'x' * 60}' and 940 bytes more"
+    assert str(error) == f"expected a thing; got b'{'x' * 60}' and 940 bytes more"
 
 
 def test_resync_recipe():
@@ -407,7 +407,7 @@ def test_packets_in_pieces(kinds, cuts):
     ],
 )
 def test_wrong_packets_raise(came):
-    with pytest.raises(BridgeError, match=r"expected .*; came"):
+    with pytest.raises(BridgeError, match=r"expected .*; got"):
         PacketParser().feed(came)
 
 

@@ -171,7 +171,7 @@ def test_without_a_display_the_recording_is_beside_the_champion(
     assert list(recording.poses) == ["run_champion_json"]
     assert recording.title == "run/champion.json"
     assert "run/champion.json: fitness" in recording.summary
-    assert "what evolution believed: 12.3" in recording.summary
+    assert "from its trials in evolution: 12.3" in recording.summary
 
 
 def test_the_trial_is_the_one_that_anybody_can_repeat(champion, here, capsys):
@@ -282,7 +282,7 @@ def test_generations_of_an_unfinished_run(run, capsys):
         "generation 3",
         "generation 4",
     ]
-    assert "what evolution believed: 3.0" in recording.summary
+    assert "from its trials in evolution: 3.0" in recording.summary
 
 
 @pytest.mark.parametrize("option", [(), ("--generations", "last")])

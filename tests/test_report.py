@@ -195,7 +195,7 @@ def test_disturbed_champions_are_shown_with_their_disturbances(tmp_path):
         fields["scores"]["held_out_as_evolved"] = disturbed
         champion.write_text(json.dumps(fields))
     text = to_markdown(held_out_fitness_section(load_study(path)))
-    assert "with the disturbances that they evolved with" in text
+    assert "experiments that evolved with disturbances" in text
     assert "| GA | 2 | 41.5 (41.0, 42.0) |" in text
 
 

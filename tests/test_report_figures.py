@@ -360,7 +360,7 @@ def test_trajectories_are_of_every_experiment_of_a_world(data, trajectories, tmp
     np.testing.assert_array_equal(starts[:2], starts[2:])
     assert (starts[0] != starts[1]).all()
     assert f"seed {seeds['my own']} of my own (n = 1)" in caption
-    assert "fitness are others: GA." in caption
+    assert "fitness differ: GA." in caption
     assert legend_texts(figure)[1:3] == ["start", "robot at the end"]
     figure.savefig(tmp_path / "trajectories.svg")
     assert (tmp_path / "trajectories.svg").stat().st_size < 300_000

@@ -450,7 +450,7 @@ def at_wall(kinematic):
 
 def test_a_stall_is_a_stale_reading(at_wall):
     world = at_wall("stall@1")
-    with pytest.raises(StaleReading, match=r"every 300 ms; came none: .* D N"):
+    with pytest.raises(StaleReading, match=r"every 300 ms; got none: .* D N"):
         world.drive(100)
     # 300 ms after the last reading it was told to stop; it heard so after the stall
     assert world.time.now - world.began < 1.5 + 0.4
@@ -532,7 +532,7 @@ def test_a_lost_byte_costs_a_resynchronisation(at_wall):
 def test_a_computer_that_slept_drives_no_further(at_wall):
     world = at_wall("")
     with (
-        pytest.raises(ComputerBusy, match="came none for 1100 ms"),
+        pytest.raises(ComputerBusy, match="got none for 1100 ms"),
         world.robot as robot,
     ):
         robot.greet()

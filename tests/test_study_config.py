@@ -261,7 +261,7 @@ def test_a_run_has_its_own_seed_and_nothing_else(here):
         ("experiments: [ga, ga.yaml]", ("two experiments are called 'ga'",)),
         ("experiments: [ga]\ncommon: []", ("expected 'common', a mapping, got []",)),
         ("experiments: [ga]\ncommon: {seed: 7}", ("'seed' has no effect here",)),
-        ("experiments: [ga]\nexperiments: [ga]", ("stands twice, in line 1 and 2",)),
+        ("experiments: [ga]\nexperiments: [ga]", ("appears twice, in line 1 and 2",)),
         ("experiments: [ga]\ncommon: 3", ("expected 'common', a mapping, got 3",)),
         ("experiments: [ga]\ncommon: {stps: 3}", ("', common: unknown key 'stps'",)),
         ("experiments: [ga]\ncommon: {steps: x}", ("common: steps: ", "got 'x'")),

@@ -47,7 +47,7 @@ class Options:
         champion: directory of a finished run, controller file, or wall-follower, the
             hand-written controller.
         port: port of the robot: /dev/rfcomm0, COM5 or socket://host:port; for an
-            e-puck2 over WiFi tcp://host:1000. Repeated, it is a fleet of robots.
+            e-puck2 over WiFi tcp://host:1000. Repeat it for a fleet of robots.
         fleet: file with the name, port, controller and calibration of several robots.
         seconds: duration of the drive [s].
         calibrate: first let the robot set its sensors' zero; nothing may be near it.
@@ -59,7 +59,7 @@ class Options:
         arena: arena to show the log in; if not given, the one the champion evolved in.
         log: name of the log, written as .npz, .rrd and .png, or of a fleet's folder of
             logs; a name in runs/ if not given.
-        verbose: messages have technical details.
+        verbose: add technical details to messages.
         list_ports: list the serial ports of this computer and exit.
     """
 
@@ -79,7 +79,7 @@ class Options:
 
 
 def bridge(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     if options.list_ports:
         for name, description in ports():
@@ -99,9 +99,9 @@ def bridge(argv: Sequence[str]) -> int:
 
 
 def _drive_alone(options: Options, order: Order) -> int:
-    """Drive one robot on this terminal; the exit status."""
+    """Drive one robot on this terminal and return the exit status."""
     wanted, show = mission(order), _show(options, order)
-    # no search for garbage among what was loaded, neither as it drives nor as it ends
+    # no garbage collection of loaded modules, neither during the drive nor at its end
     gc.freeze()
     status = drive_alone(wanted, lambda: connect(order.port), show, time.monotonic)
     if status == RUNAWAY:
@@ -110,12 +110,12 @@ def _drive_alone(options: Options, order: Order) -> int:
 
 
 def _drive_fleet(options: Options, members: Sequence[Member]) -> int:
-    """Drive several robots, each by a process of its own; the exit status."""
+    """Drive robots, each by a process of its own, and return the exit status."""
     folder = log.log_name(options.log, "fleet")
     orders, shows = {}, {}
     for member in members:
         order = _order(options, member, folder / member.name)
-        # what is wrong with a file is known before a process is started
+        # find errors in the files before a process is started
         try:
             mission(order)
             shows[member.name] = _show(options, order)
@@ -127,7 +127,7 @@ def _drive_fleet(options: Options, members: Sequence[Member]) -> int:
     try:
         return drive_fleet(orders, shows)
     finally:
-        # empty, if nobody drove
+        # the folder is empty if no robot drove
         with contextlib.suppress(OSError):
             folder.rmdir()
 
@@ -151,7 +151,7 @@ def _order(options: Options, member: Member, name: Path) -> Order:
 
 def _show(options: Options, order: Order) -> Show:
     """What writes the pictures of a drive, when the robot stands."""
-    # physics is not for those who only ask for help
+    # slow to import, and not needed for --help
     from epuck_mj.scene.model import load_scene
 
     driver = champion(order.controller)
@@ -159,7 +159,7 @@ def _show(options: Options, order: Order) -> Show:
     scene = load_scene(driver.robot, arena, driver.task.control_step)
 
     def show(name: Path, trajectory: Trajectory, summary: str) -> list[Path]:
-        # rerun and matplotlib take their time
+        # rerun and matplotlib are slow to import
         from epuck_mj.bridge.drive.pictures import save_pictures
 
         placed = options.pose is not None

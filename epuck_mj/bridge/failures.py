@@ -33,7 +33,7 @@ class BridgeError(UserError):
     def __init__(self, expected: str, came: str | bytes) -> None:
         """Store what was expected and what came; long bytes are shortened."""
         text = came if isinstance(came, str) else _shown(came)
-        super().__init__(f"expected {expected}; came {text}")
+        super().__init__(f"expected {expected}; got {text}")
 
 
 class RobotRestarted(BridgeError):
@@ -43,7 +43,7 @@ class RobotRestarted(BridgeError):
     """
 
     happened = "the robot started anew, as after a reset or with an empty battery"
-    advice = "Charge its battery and keep off its reset button, then start it again."
+    advice = "Charge its battery, do not touch its reset button, then start it again."
 
 
 class NoReply(BridgeError):
@@ -53,7 +53,7 @@ class NoReply(BridgeError):
 
 
 class LinkLost(BridgeError):
-    """The port is gone."""
+    """The port was lost."""
 
     happened = "the connection to the robot was lost"
     advice = "Is it switched on, charged and near enough, and its cable plugged in?"
@@ -67,7 +67,7 @@ class StaleReading(BridgeError):
 
 
 class ComputerBusy(StaleReading):
-    """The latest reading is too old, since this computer did something else."""
+    """The latest reading is too old, because this computer was busy."""
 
     happened = f"this computer was busy and did not ask for {READING_AGE_MAX:g} s"
     advice = "Close other programs, then start it again."

@@ -51,9 +51,9 @@ class Options:
 
     Attributes:
         port: port of the robot, as for the bridge.
-        output: file to write; values in it that are not measured now stay.
-        only: do only this step, instead of straight, turn and sensors.
-        verbose: messages have technical details.
+        output: file to write; values in it that are not measured now stay the same.
+        only: do only this step; otherwise all: straight, turn and sensors.
+        verbose: add technical details to messages.
     """
 
     port: Annotated[str, word("PORT")] = ""
@@ -82,7 +82,7 @@ ANSWER_MAX = 1000
 
 
 def calibrate(argv: Sequence[str], ask: Callable[[str], str] = answer) -> int:
-    """Run the command line; its exit status.
+    """Run the command line and return its exit status.
 
     Args:
         argv: what was typed.
@@ -117,7 +117,7 @@ def calibrate_robot(
     sleep: Callable[[float], None] = time.sleep,
     verbose: bool = False,
 ) -> int:
-    """Calibrate and write the file after each step; the exit status, as the bridge's.
+    """Calibrate, write the file after each step, and return the exit status.
 
     Args:
         steps: names of STEPS.
@@ -125,13 +125,13 @@ def calibrate_robot(
         connect: opens the way to the robot.
         ask: shows a question and gives the answer.
         clock: what the connection tells times by.
-        sleep: lets so many seconds go by.
+        sleep: waits for a number of seconds.
         verbose: whether messages have details.
 
     Raises:
         UserError: if something cannot be; the robot stands.
     """
-    # a person has work with it before it is written
+    # the measurements take time: check first that the file can be written
     check_writable(output)
     known = Calibration.load(output) if is_file(output) else Calibration()
     status, word = DONE, ""
@@ -140,7 +140,7 @@ def calibrate_robot(
         person = Person(ask, interruption)
         try:
             person.hear("The robot drives. Ctrl-C stops it and ends.")
-            # see that the robot answers before a person lays out a floor
+            # check that the robot answers before the user prepares the floor
             bench.with_robot(known, lambda robot: None)
             for step in steps:
                 known = STEPS[step](bench, person, known)
@@ -156,7 +156,7 @@ def calibrate_robot(
             status = interruption.status
             word = f"{interruption.signum.name}: ended, the robot stands still"
         if word:
-            # a question may stand there unanswered
+            # the cursor may be behind an unanswered question
             with Output(sys.stdout) as line:
                 line.say("")
             complain(word)

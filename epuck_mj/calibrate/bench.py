@@ -68,7 +68,7 @@ class Bench:
         connect: opens the way to it.
         interruption: what ends a drive before its time.
         clock: what the connection tells times by [s].
-        sleep: lets so many seconds go by.
+        sleep: waits for a number of seconds.
         verbose: whether messages have details.
     """
 
@@ -144,7 +144,7 @@ def look_around(
     """
 
     def job(robot: RealRobot) -> tuple[np.ndarray, np.ndarray]:
-        # a slow link makes a slow turn
+        # the slower the link, the slower the turn
         robot.begin()
         times = [robot.last.time]
         for _ in range(N_LOOKS):
@@ -184,7 +184,7 @@ def _turned(robot: RealRobot, calibration: Calibration) -> float:
 def _drive(
     robot: RealRobot, rates: tuple[int, int], made: Callable[[], float], steps: float
 ) -> None:
-    """Drive until so many steps are made, then stand.
+    """Drive until the motors have made a number of steps, then stand.
 
     Args:
         robot: that has begun.

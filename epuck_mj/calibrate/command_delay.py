@@ -72,7 +72,7 @@ def fit_delay(drive: RecordedDrive) -> CommandDelay:
 
 
 def told_steps(drive: RecordedDrive, delay: float) -> np.ndarray:
-    """Steps that motors make between readings if commands come so late, `(T, 2)`."""
+    """Steps that motors make between readings with commands that late, `(T, 2)`."""
     rates = actual_rates(drive.rates)
     sums = np.cumsum(rates * np.diff(drive.time)[:, None], axis=0)
     made = np.concatenate([np.zeros((1, 2)), sums])

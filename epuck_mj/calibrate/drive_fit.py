@@ -139,11 +139,11 @@ def fit_drive(drive: RecordedDrive, scene: Scene, known: Calibration) -> DriveFi
         model, joint = _likeliest(model, before)
         _refuse_strange(model, joint, near)
         shown = joint.errors <= ERRORS_MAX
-        # both or none: what is told apart is their sum and their difference
+        # both or none: a drive shows their sum and their difference
         shown[[LEFT, RIGHT]] = shown[LEFT] and shown[RIGHT]
         if not shown.any() and not delay.known:
             raise UserError(
-                f"nothing of the robot can be told from this drive: its wheels rolled "
+                f"this drive shows nothing about the robot: its wheels rolled "
                 f"{drive.way * WHEEL_RADIUS:.2f} m, and {int(near.sum())} readings "
                 "were near a wall"
             )
@@ -225,10 +225,10 @@ def _jump(model: DriveModel, found: Smoothed) -> Jump | None:
     jump = Jump(float(model.time[worst]), float(way[worst]), float(turn[worst]))
     if jump.way > JUMP_MAX[0] or jump.turn > JUMP_MAX[1]:
         raise UserError(
-            f"expected a drive in one piece; {jump.time:.1f} s after its start the "
+            f"expected a drive without jumps; {jump.time:.1f} s after its start the "
             f"robot would have jumped by {1000 * jump.way:.0f} mm and "
-            f"{np.degrees(jump.turn):.0f} degrees: another --arena, another start "
-            "(--pose), or somebody moved it"
+            f"{np.degrees(jump.turn):.0f} degrees: --arena or --pose is wrong, or "
+            "somebody moved the robot"
         )
     return jump
 
@@ -238,7 +238,7 @@ def _strange(share: float, drive: RecordedDrive) -> UserError:
     return UserError(
         f"expected readings that fit the arena from a start at x {x:g} m, y {y:g} m, "
         f"heading {np.degrees(yaw):.0f} degrees; {100 * share:.0f} % of those near a "
-        "wall do not: it was another --arena, another start (--pose), or no e-puck"
+        "wall do not fit: --arena or --pose is wrong, or the robot is not an e-puck"
     )
 
 

@@ -145,7 +145,7 @@ class DriveModel:
         return self.drive.time[self.first : self.last + 1]
 
     def wheels(self, lag: float) -> Wheels:
-        """What the wheels do if the lag is so much of the nominal robot's."""
+        """What the wheels do with a lag, given as a multiple of the nominal one."""
         if lag not in self._wheels:
             # a fit comes back to few
             if len(self._wheels) > 20:

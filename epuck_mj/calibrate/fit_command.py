@@ -32,9 +32,9 @@ class FitOptions:
     Attributes:
         log: the .npz file that python -m epuck_mj.bridge has written.
         arena: arena that the robot drove in.
-        pose: where it started, x and y [m] and heading [degrees], if not where the log
-            says; within about 2 cm and 10 degrees.
-        output: file to write; values in it that the drive does not show stay.
+        pose: start of the robot, x and y [m] and heading [degrees], within about 2 cm
+            and 10 degrees; if not given, the start that the log has.
+        output: file to write; values that the drive does not show stay the same.
     """
 
     log: tyro.conf.Positional[Annotated[Path | None, word("FILE")]] = None
@@ -44,7 +44,7 @@ class FitOptions:
 
 
 def fit(argv: Sequence[str]) -> int:
-    """Run the command line behind `fit`; its exit status."""
+    """Run the command line behind `fit` and return its exit status."""
     prog = "python -m epuck_mj.calibrate fit"
     options = parse(FitOptions, prog, argv, examples=EXAMPLES)
     if options.log is None:
@@ -54,7 +54,7 @@ def fit(argv: Sequence[str]) -> int:
     check_writable(options.output)
     output = options.output
     known = Calibration.load(output) if is_file(output) else Calibration()
-    # physics is not for those who only ask for help
+    # slow to import, and not needed for --help
     import numpy as np
 
     from epuck_mj.calibrate.drive_fit import fit_drive

@@ -116,8 +116,8 @@ def fit_gains(clearances: np.ndarray, counts: np.ndarray) -> SensorFit:
     if not n_used.all():
         names = ", ".join(f"ps{number}" for number in np.flatnonzero(n_used == 0))
         raise UserError(
-            f"expected peaks below {SATURATED} counts at some distance, "
-            f"got none of {names}"
+            f"expected a peak below {SATURATED} counts of each sensor at some "
+            f"distance, got none of {names}"
         )
     logs = np.where(used, np.log(np.maximum(counts, 1.0) / mean_sensor), 0.0)
     fitted = logs.sum(axis=0) / n_used

@@ -49,11 +49,11 @@ MISSES = (-360.0, 360.0)
 
 
 ANSWERS_MAX = 20
-"""Wrong answers to a question after which nobody is there who reads it. Chosen."""
+"""Wrong answers to one question after which the command ends. Chosen."""
 
 
 class Person:
-    """Person at the robot; UserError says that the input has ended, or is none."""
+    """Person at the robot, who reads instructions and types answers."""
 
     def __init__(self, ask: Callable[[str], str], interruption: Interruption) -> None:
         """Start without a question asked.
@@ -66,7 +66,7 @@ class Person:
         self._interruption = interruption
 
     def hear(self, text: str) -> None:
-        """Print something to read; a signal ends that, whoever does not read.
+        """Print a text; a signal ends this even if the text is not read.
 
         Raises:
             OutputLost: if it cannot be printed.

@@ -15,7 +15,7 @@ from epuck_mj.step.sensors import sensed_distance
 
 @dataclass(frozen=True)
 class Quantity:
-    """How far what was recorded is from what is expected of a robot.
+    """Differences between what was recorded and what a robot would give.
 
     Attributes:
         name: of it.
@@ -33,7 +33,7 @@ class Quantity:
 
 
 def motor_steps(drive: RecordedDrive, before: int, after: int) -> Quantity:
-    """What the commands do not explain of the counters, by two latencies."""
+    """Steps of the counters that commands do not explain, for two latencies."""
     made = np.diff(drive.steps, axis=0)
     left = [
         made - told_steps(drive, latency * drive.control_step)
@@ -47,7 +47,7 @@ def motor_steps(drive: RecordedDrive, before: int, after: int) -> Quantity:
 def paths(
     model: DriveModel, before: Smoothed, after: Smoothed
 ) -> tuple[Quantity, Quantity]:
-    """Where the counters alone lead, against where the walls say that it was."""
+    """Poses from the counters alone, compared with poses that the walls show."""
     ways, turns = [], []
     for each in (before, after):
         path = model.path(after.poses[0], each.parameters)
@@ -64,7 +64,7 @@ def paths(
 def readings(
     model: DriveModel, before: Smoothed, after: Smoothed, near: np.ndarray
 ) -> list[Quantity]:
-    """Distances that the sensors tell, against those to the arena's walls."""
+    """Distances from the sensors, compared with those to the arena's walls."""
     left = [
         sensed_distance(model.drive.counts, np.exp(each.parameters[GAINS]))
         - model.distances(each.poses)

@@ -38,7 +38,7 @@ class RecordedDrive:
 
     @property
     def way(self) -> float:
-        """Mean angle by which the wheels turned, back and forth alike [rad]."""
+        """Mean angle by which the wheels turned, in either direction [rad]."""
         return float(np.abs(np.diff(self.steps, axis=0)).mean(axis=1).sum()) * (
             STEP_ANGLE
         )
@@ -58,7 +58,7 @@ def load_drive(path: Path, start: np.ndarray | None = None) -> RecordedDrive:
     if log.motor_steps is None:
         raise UserError(
             f"'{path}' has no motor_steps: expected the log of a drive by "
-            "python -m epuck_mj.bridge, not a simulation's or an older one"
+            "python -m epuck_mj.bridge, not of a simulation or of an older version"
         )
     if log.steps < STEPS_MIN:
         raise UserError(

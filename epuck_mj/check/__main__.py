@@ -37,10 +37,10 @@ class Options:
 
 
 def check(argv: Sequence[str]) -> int:
-    """Check an arena and print the findings; the exit status."""
+    """Check an arena, print the findings, and return the exit status."""
     options = parse(Options, "python -m epuck_mj.check", argv, examples=EXAMPLES)
     check_ending("picture", options.picture, ".png")
-    # physics and pictures are for a command that makes sense
+    # slow to import: after the checks of the command line
     from epuck_mj.check import report
     from epuck_mj.check.arena import check_arena
 

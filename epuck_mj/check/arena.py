@@ -84,7 +84,7 @@ def check_arena(
     Args:
         arena: name of a shipped arena, or path of an MJCF.
         robots: names of shipped robots, or paths of MJCF files.
-        tell: what is told what is being done: large arenas take half a minute.
+        tell: called with the current step, as text: large arenas take half a minute.
 
     Raises:
         UserError: if the arena cannot be read, or a robot cannot be used at all.
@@ -92,7 +92,7 @@ def check_arena(
     path = find_arena(arena)
     checks, seen = list[Report](), list[Scene]()
     for robot in robots:
-        # in an arena that is sound, what is wrong is the robot
+        # an error in the shipped arena is an error of the robot
         load_scene(robot, "arena")
         tell(f"Checking {path.name} with {Path(robot).stem} ...")
         checks.append(_check(path, robot, seen, alone=len(robots) == 1))

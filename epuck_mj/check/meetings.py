@@ -124,7 +124,7 @@ def _rays(
     The least of rays side by side, since one may just pass a corner.
     """
     model, data = scene.model, mujoco.MjData(scene.model)
-    # the robot itself is out of the way
+    # the robot is far away, so that rays do not meet it
     data.qpos[:] = scene.qpos(np.array([FAR, FAR, 0.0]))
     mujoco.mj_kinematics(model, data)
     geom = np.zeros(1, np.int32)

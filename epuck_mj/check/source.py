@@ -78,7 +78,7 @@ def places_of(files: SourceFiles) -> Places:
             spec.compile()
     except REFUSALS as problem:
         message = " ".join(str(problem).split())
-        # what MuJoCo says of the place, we say better
+        # our message has a better place than MuJoCo's
         text = re.split(r" ?\bElement (?:name )?'", message)[0]
         text = re.sub(r"^(XML )?(Error: )+", "", text)
         place = _place(files, message)
@@ -99,7 +99,7 @@ def missing_files(files: SourceFiles) -> list[Finding]:
 
 
 def settings_not_used(files: SourceFiles) -> list[str]:
-    """What an arena says of physics that is the robot's own in a scene, as text."""
+    """An arena's settings of physics that are not used in a scene, as text."""
     inside = False
     found = []
     touch: dict[str, list[str]] = {name: [] for name in TOUCH}
@@ -159,7 +159,7 @@ def _place(files: SourceFiles, said: str, tag: str = "") -> Place:
     line = line_said - ELEMENTS_MAX - 1
     if 0 <= line < len(files.elements):
         return _place_of(files.elements[line])
-    # lines of attached models are those of their own files
+    # attached models have the line numbers of their own files
     there = [e for e in files.attached if e.tag == tag and e.line == line_said]
     if len(there) == 1:
         return _place_of(there[0])

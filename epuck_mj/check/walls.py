@@ -160,9 +160,9 @@ def _hidden(
     low, high = extent(scene.model, geom)
     if high <= heights.shell[0]:
         if high > heights.shell[0] - START_CLEARANCE:
-            text = "it lies below the shell, which may start nowhere near it; expected "
-            at = f"the floor at its height, now {mm(scene.height)}, or "
-            text += f'{at}contype="0" conaffinity="0" of what robots drive over'
+            text = "it lies below the shell, so no robot may start near it; expected "
+            text += f"the floor at its height (the floor is at {mm(scene.height)}), or "
+            text += 'contype="0" conaffinity="0" if robots drive over it'
             return [error(TOPIC, text, place)]
         below = f"the robot passes above it: it ends at {mm(high)}"
     else:

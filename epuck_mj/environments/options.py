@@ -29,11 +29,11 @@ class Options:
             `spaced` or `my.py:name`.
         v_max: forward speed at v = 1 [m/s].
         w_max: yaw rate at |w| = 1 [rad/s].
-        sensor_range: where an obstacle stops being seen [m].
+        sensor_range: distance at which an obstacle stops being seen [m].
         start_clearance: least distance from the shell to a wall at a start [m].
         noise: name of a level of `NOISE`.
         randomise: whether each trial has a different robot; needs noise.
-        calibration: of the robot of all trials, or path of its file; needs noise.
+        calibration: calibration of the robot in all trials, or its file; needs noise.
         latency: control steps until a command has reached the wheels of ideal robots;
             randomised ones have latencies of their own.
         threads: threads that step robots in MuJoCo; 0 is one per core.

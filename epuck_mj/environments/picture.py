@@ -49,7 +49,7 @@ class TrialPicture:
         if self._painter is None:
             artist = painter(self._scene, [self._trajectory], *self._size, draft=True)
             self._painter = self._open.enter_context(artist)
-            # OpenGL must be free before its library ends, also if nobody closes
+            # free OpenGL before its library ends, even without a call of close()
             atexit.register(self.close)
         return self._painter.picture(self._k * self._step).copy()
 

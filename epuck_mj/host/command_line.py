@@ -176,7 +176,7 @@ def main(run: Callable[[Sequence[str]], int]) -> None:
             complain(f"error: {line}")
             status = 2
     give_up_streams()
-    # nothing is left to be tidied up
+    # nothing has to be cleaned up
     loading.end_at_interrupts()
     sys.exit(status)
 

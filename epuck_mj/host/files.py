@@ -28,7 +28,7 @@ def write_bytes(path: Path, content: bytes) -> None:
     A link stays one, and what it names is replaced; pipes and devices are refused.
     """
     asked, path = path, path.resolve() if path.is_symlink() else path
-    # named before it is there: whenever a signal comes, it is known what to remove
+    # named before it exists, so that a signal at any time can remove it
     temporary = _temporary(path)
     try:
         if _is_special(path):
@@ -160,7 +160,7 @@ def read_bytes(path: Path, most: int) -> bytes:
         UserError: if it is missing, not to be read, too large, or no file.
     """
     try:
-        # whoever opens a pipe waits for its other end
+        # opening a pipe would wait for its other end
         if _is_special(path):
             raise OSError(errno.EINVAL, NO_FILE)
         with path.open("rb") as file:

@@ -73,7 +73,7 @@ class Interruption:
             with not_dropped(Interrupted, self._raise_again):
                 yield
         except Exception as error:
-            # whatever was interrupted may have failed to clear up
+            # the interrupted code may have failed while it cleaned up
             if follows(error, Interrupted):
                 raise Interrupted from error
             raise
@@ -96,7 +96,7 @@ class Interruption:
 def not_dropped(
     kind: type[BaseException], again: Callable[[], object]
 ) -> Iterator[None]:
-    """Have a signal's exception raised again if Python drops it in the block.
+    """Raise a signal's exception again if Python drops it in the block.
 
     A signal may come while a finaliser runs, out of which nothing can be raised: Python
     prints the exception and goes on.
@@ -170,7 +170,7 @@ def deaf_to_interrupts() -> Iterator[None]:
         with ignoring_interrupts():
             yield
         return
-    # for those who start processes
+    # needed only where processes are started
     from multiprocessing import resource_tracker
 
     # the tracker lets signals in again as it starts, so it starts before the block

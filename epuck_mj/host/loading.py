@@ -1,4 +1,4 @@
-"""A command while its modules load, which takes seconds: it can be stopped already.
+"""Loading of a command's modules, which takes seconds and can be interrupted.
 
 `command_line.main` comes later: until then Ctrl-C and a lack of memory would print a
 traceback. Nothing is written and nobody drives yet.
@@ -33,7 +33,7 @@ def is_command() -> bool:
 
 
 def prepare() -> None:
-    """If this is a command: let nothing that it meets while loading be a traceback."""
+    """In a command: let errors and signals while loading show no traceback."""
     if not is_command():
         return
     # commands make OpenGL themselves, if they draw: see `show.render`

@@ -1,6 +1,6 @@
 """Standard output and error, which may be closed, full, or read by nobody.
 
-Only what every Python has is imported: this is there before all else is loaded.
+This module imports only the standard library, because it is loaded first.
 """
 
 import contextlib
@@ -32,7 +32,7 @@ class OutputLost(UserError):
 class Output:
     """A stream of text that never makes its writer wait.
 
-    Texts that nobody takes in time are dropped: a terminal may be stopped (Ctrl-S) or
+    Texts that are not read in time are dropped: a terminal may be stopped (Ctrl-S) or
     far away, and a program may forget to read.
     """
 
@@ -139,7 +139,7 @@ def standard_streams() -> None:
         UserError: if standard output is closed.
     """
     if sys.stderr is None:
-        # nobody wants to read it
+        # the parent process has closed it
         sys.stderr = open_nowhere()
     if sys.stdout is None:
         sys.stdout = open_nowhere()
@@ -150,12 +150,12 @@ def standard_streams() -> None:
 
 
 def open_nowhere() -> TextIO:
-    """A stream that forgets everything."""
+    """A stream that drops all text."""
     return Path(os.devnull).open("w", encoding="utf-8")
 
 
 def give_up_streams() -> None:
-    """Let streams that cannot be written forget what they hold.
+    """Drop the text that is left in streams that cannot be written.
 
     Python's own flush at the end would complain of it.
     """
@@ -167,7 +167,7 @@ def give_up_streams() -> None:
 
 
 def abandon(stream: TextIO) -> None:
-    """Lose what a stream could not write, for which python waits as it ends."""
+    """Drop what a stream could not write, so that python can end without a wait."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
@@ -184,7 +184,7 @@ def _write_at_once(stream: TextIO, text: str) -> None:
     try:
         handle = stream.fileno()
     except io.UnsupportedOperation:
-        # no file, as in notebooks
+        # not a file, as in notebooks
         stream.write(text)
         stream.flush()
         return

@@ -93,14 +93,16 @@ class _StrictLoader(yaml.SafeLoader):
         for key_node, _ in pairs:
             line = key_node.start_mark.line + 1
             if key_node.tag == "tag:yaml.org,2002:merge":
-                raise _NotStrictError(f"'<<' in line {line} is not read: expected keys")
+                raise _NotStrictError(
+                    f"'<<' in line {line} is not allowed: expected keys"
+                )
             key = self.construct_object(key_node, deep=True)
             # as are keys that cannot be looked up
             if isinstance(key, Hashable):
                 if key in lines:
                     both = " and ".join(map(str, dict.fromkeys([lines[key], line])))
                     raise _NotStrictError(
-                        f"key {shown(key)} stands twice, in line {both}"
+                        f"key {shown(key)} appears twice, in line {both}"
                     )
                 lines[key] = line
         return super().construct_mapping(node, deep=deep)
@@ -152,12 +154,12 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(content) < len(pairs):
         keys = [key for key, _ in pairs]
         twice = next(key for key in keys if keys.count(key) > 1)
-        raise _NotStrictError(f"key {shown(twice)} stands twice")
+        raise _NotStrictError(f"key {shown(twice)} appears twice")
     return content
 
 
 def _no_number(text: str) -> NoReturn:
-    raise _NotStrictError(f"{text} is no number: expected a finite one")
+    raise _NotStrictError(f"expected a finite number, got {text}")
 
 
 def _finite(text: str) -> float:

@@ -90,7 +90,7 @@ class ControllerFile:
 
     def to_json(self) -> str:
         """The file's text; the genome comes back bit for bit."""
-        # what is not known is left out
+        # unknown values are left out
         origin = {k: v for k, v in asdict(self.origin).items() if v is not None}
         if not self.origin.own_sha256:
             del origin["own_sha256"]

@@ -187,7 +187,7 @@ def topology_from(fields: Mapping[str, Any]) -> Topology:
 
 
 def check_network(name: str) -> None:
-    """Refuse a user's network that acts otherwise alone than among others.
+    """Refuse a user's network if a robot acts differently alone and among others.
 
     Args:
         name: as `my.py:Name`.
@@ -208,6 +208,6 @@ def check_network(name: str) -> None:
         one = [policy(seen) for policy, seen in each]
         if not (np.array_equal(action, few) and np.array_equal(action, one)):
             raise UserError(
-                f"network '{name}': a robot acts otherwise alone than among others; "
+                f"network '{name}': a robot acts differently alone and among others; "
                 "expected sums that are written out instead of matrix products"
             )

@@ -32,7 +32,7 @@ class WallFollower:
         turn = np.clip(
             GAIN * (observation[..., RIGHT_DIAGONAL] - TARGET), -TURN_MAX, TURN_MAX
         )
-        # straight on where no wall is; on the spot to the left where one blocks
+        # straight on without a wall; turn left on the spot if a wall is ahead
         turn = np.where(side < 1, turn, 0.0)
         forward = np.where(blocked, 0.0, 1.0)
         return np.stack([forward, np.where(blocked, -1.0, turn)], axis=-1)

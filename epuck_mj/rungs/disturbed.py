@@ -24,7 +24,7 @@ def disturbed(
         control_step: its duration [s].
     """
     if disturbances is None:
-        # nothing is left of those before
+        # undo the bodies of earlier disturbances
         robots.disembody()
         return robots
     return DisturbedRobots(robots, disturbances, control_step)

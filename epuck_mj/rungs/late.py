@@ -36,7 +36,7 @@ class LateRobots:
 
     def restart(self, which: np.ndarray, starts: np.ndarray) -> Reading:
         """See `Robots.restart`."""
-        # the arrays are those of whoever sent them
+        # copies, because the caller owns the arrays
         self._sent = [command.copy() for command in self._sent]
         for command in self._sent:
             command[which] = 0.0

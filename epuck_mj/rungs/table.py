@@ -14,7 +14,7 @@ from epuck_mj.step.control import TaskParameters
 
 
 def _kinematic(scene: Scene, capacity: int, threads: int) -> Simulator:
-    # numba for those who use it
+    # numba is slow to import
     from epuck_mj.rungs.kinematic.robots import KinematicRobots
 
     return KinematicRobots(scene, capacity, threads)

@@ -49,7 +49,7 @@ class WatchedRobot:
         self.data.ctrl[self.scene.wheels] = command[0]
         warning = self.data.warning
         for _ in range(self.scene.n_substeps):
-            # the second half first: positions and sensors are always those of now
+            # the second half first, so that positions and sensors are of the same time
             with heeded(self.scene, warning.number, warning.lastinfo):
                 mujoco.mj_step2(self.model, self.data)
                 mujoco.mj_step1(self.model, self.data)

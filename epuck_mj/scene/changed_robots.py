@@ -48,7 +48,7 @@ def with_sensors_set_back(scene: Scene, back: float) -> Scene:
 
 
 def with_body_margin(scene: Scene, margin: float) -> Scene:
-    """The scene with a shell whose radius is so much larger [m]; itself for 0.
+    """The scene with a shell whose radius is larger by `margin` [m].
 
     Raises:
         UserError: if the shell has no radius.

@@ -106,7 +106,7 @@ class ClearanceProbe:
                 which = rest[part]
                 near = self._near(poses[which[0]], side, reach)
                 found[:, which] = self._probe(near).measure(poses[which])
-            # a wall that was left out may be as near
+            # a wall that was left out may be as near as the nearest one
             rest = rest[found[0, rest] >= reach]
         return found
 

@@ -1,8 +1,8 @@
 """Scenes: a robot put into an arena, checked, compiled, names turned into indices.
 
 An arena is any MJCF with walls. It may include a robot, so that MuJoCo's viewer shows
-the whole scene; `load_scene` puts the robot asked for in that one's place. The robot's
-physics is its own in every arena: see `mjcf`.
+the whole scene; `load_scene` replaces that robot by the one asked for. The robot has
+the same physics in every arena: see `mjcf`.
 """
 
 import copy

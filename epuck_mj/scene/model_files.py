@@ -40,7 +40,7 @@ def find_robot(name: str) -> Path:
             f"robot '{name}': expected another file name; '{KINEMATIC_ROBOT}' is the "
             "shipped robot that is simulated without MuJoCo"
         )
-    # one robot, simulated in two ways
+    # the same robot in two simulators
     shipped = MODELS / ROBOT_FILE
     by_name = {KINEMATIC_ROBOT: shipped, WHEELED_ROBOT: shipped}
     return find(name, "robot", by_name, "an MJCF").resolve()

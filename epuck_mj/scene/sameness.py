@@ -48,8 +48,8 @@ def check_same(model: mujoco.MjModel, alone: mujoco.MjModel, arena: Path) -> Non
         name = label.name.removeprefix("mjOBJ_").lower()
         if len(own) != len(its):
             raise UserError(
-                f"arena '{arena}' changes the robot: {len(own)} parts of kind {name}, "
-                f"not {len(its)} as alone"
+                f"arena '{arena}' changes the robot: expected {len(its)} parts of kind "
+                f"{name}, got {len(own)}"
             )
         for field in _fields(model, kind):
             values, expected = getattr(model, field)[own], getattr(alone, field)[its]
@@ -59,8 +59,8 @@ def check_same(model: mujoco.MjModel, alone: mujoco.MjModel, arena: Path) -> Non
                 part = mujoco.mj_id2name(model, label.value, own[i]) or f"{i}"
                 raise UserError(
                     f"arena '{arena}' changes the robot: {field} of {name} "
-                    f"'{part.removeprefix(PREFIX)}' is {_shown(values[i])}, "
-                    f"{_shown(expected[i])} alone"
+                    f"'{part.removeprefix(PREFIX)}': expected {_shown(expected[i])}, "
+                    f"got {_shown(values[i])}"
                 )
     for field in (name for name in dir(model.opt) if not name.startswith("_")):
         if not np.array_equal(getattr(model.opt, field), getattr(alone.opt, field)):
@@ -78,7 +78,7 @@ def _parts(
         "geom": np.flatnonzero(mine[model.geom_bodyid]),
         "site": np.flatnonzero(mine[model.site_bodyid]),
         "dof": np.flatnonzero(mine[model.dof_bodyid]),
-        # attached last
+        # the robot is attached last
         "actuator": np.arange(model.nu - alone.nu, model.nu),
         "sensor": np.arange(model.nsensor - alone.nsensor, model.nsensor),
     }

@@ -167,7 +167,7 @@ class FreeSpace:
 
         Source: A. B. Owen, J. Complexity 14 (1998) 466-489, for the scrambling.
         """
-        # it loads much of scipy, for those who choose or test champions
+        # slow to import, and needed only to choose or test champions
         from scipy.stats.qmc import Sobol
 
         points = Sobol(3, rng=rng)

@@ -25,7 +25,7 @@ from epuck_mj.trials.trajectory import Trajectory
 
 BLUE, VERMILION = colors.fraction(colors.BLUE), colors.fraction(colors.VERMILION)
 
-# yellow to dark blue, without the end that white paper swallows
+# yellow to dark blue, without the lightest colours, which can hardly be seen on white
 FITNESS_COLORS = ListedColormap(colormaps["cividis_r"](np.linspace(0.1, 1, 256)))
 
 

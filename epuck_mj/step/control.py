@@ -72,7 +72,7 @@ class TaskParameters:
         steps: control steps of a trial.
         control_step: duration of a control step [s].
         fitness: name of the step fitness: `product`, `literal` or `my.py:name`.
-        sensor_range: where an obstacle stops being seen [m].
+        sensor_range: distance at which an obstacle stops being seen [m].
         speeds: what a full action means.
 
     Raises:
@@ -178,7 +178,7 @@ def control_step(
     wheels = command(action, task.speeds)
     reading = robot.step(wheels)
     seen = observe(reading.distance, task.sensor_range)
-    # what a step is worth is not for noisy sensors to say
+    # fitness is computed without noise
     judged, distance = seen, reading.distance
     if reading.truth is not None:
         judged, distance = observe(reading.truth, task.sensor_range), reading.truth
@@ -344,7 +344,7 @@ def run_trials(
             most = fitness.copy()
             most[active[alive]] += left
             alive &= ~lost(most)[active]
-        # those who are done leave; everything kept per robot follows
+        # drop robots whose trial is over, and everything kept for them
         if not alive.all():
             active, observation = active[alive], observation[alive]
             if not active.size:

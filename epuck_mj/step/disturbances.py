@@ -190,7 +190,7 @@ class Disturbances:
         return type(self)(**{**arrays, "of": self.of[index]})
 
     def renew(self, which: np.ndarray, others: Self) -> None:
-        """Put other disturbances in the place of those of some trials, in the arrays.
+        """Replace the disturbances of some trials, in the arrays.
 
         Args:
             which: numbers of these trials, `(k,)`.
@@ -231,7 +231,7 @@ def draw_disturbances(
     low, high = np.log(ranges.gain)
     drawn = Disturbances(
         of=np.arange(n),
-        # a sensor that is twice as strong is as likely as one half as strong
+        # a gain of 2 is as likely as a gain of 1/2
         gains=np.exp(rng.uniform(low, high, (n, N_PROXIMITY))),
         known_gains=np.ones((n, N_PROXIMITY)),
         age=rng.uniform(0, noise.age, (n, N_PROXIMITY)),

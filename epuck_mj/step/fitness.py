@@ -1,11 +1,11 @@
 """Step fitness: what a control step is worth.
 
-Two shipped forms read equation (2) of the paper. Its prose ("maximize linear velocity
-while minimizing both the angular velocity and robot-distance to the wall") is
-`product`; its print, where closeness only softens the price of turning, is
-`literal`, whose optimum is driving circles far from any wall. The third form, `spaced`,
-is not the paper's: it pays most for some distance from the wall. Another one is a
-function in a file of the user's, `my.py:name`.
+Three forms are shipped. `product` follows the paper's prose about equation (2):
+"maximize linear velocity while minimizing both the angular velocity and robot-distance
+to the wall". `literal` is equation (2) as printed, where closeness only reduces the
+penalty for turning; its optimum is driving circles far from any wall. `spaced` is not
+from the paper: it pays most for some distance from the wall. A user's own fitness is a
+function in a file, `my.py:name`.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Sensors: from a robot's readings to the network's observation.
 
-Everything above this line is the same in simulation and on the robot.
+The same functions serve simulated robots and the real one.
 """
 
 from dataclasses import dataclass

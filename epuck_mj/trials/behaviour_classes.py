@@ -2,7 +2,7 @@
 
 The first class of the table that fits is the trial's. Failures come first: a robot
 that ends in a wall or in a corner is no wall follower, however well it began. Then
-come those that follow walls, then those that do something else.
+come trials that follow walls, then trials that do something else.
 """
 
 from collections.abc import Callable
@@ -38,13 +38,13 @@ OTHER = "other"
 
 CLASSES: MappingProxyType[str, Callable[[Behaviour], np.ndarray]] = MappingProxyType(
     {
-        # whatever went before
+        # a crash, whatever the robot did before it
         "crashed": lambda b: b.crashed,
-        # all its life on one spot, turning
+        # on one spot for the whole trial, turning
         "spinner": lambda b: (b.reach < SPOT) & (np.abs(b.turn) >= ROUND),
         # at last on one spot: in a corner, before a wall, or from the start on
         "stuck": lambda b: b.reach_at_end < SPOT,
-        # a wall follower that rides where a real robot would scrape
+        # a wall follower so close to the wall that a real robot would touch it
         "hugger": lambda b: b.follows & (b.clearance_mean < HUG),
         "wall follower": lambda b: b.follows,
         # round and round, no more than one visit to a wall each time
@@ -63,16 +63,19 @@ CLASSES: MappingProxyType[str, Callable[[Behaviour], np.ndarray]] = MappingProxy
 
 MEANINGS: MappingProxyType[str, str] = MappingProxyType(
     {
-        "crashed": "the shell touched a wall, whatever went before",
-        "spinner": f"turned on one spot of {SPOT * 1000:.0f} mm all its life",
-        "stuck": f"stayed on such a spot for its last {LAST_TIME:.0f} s",
+        "crashed": "the shell touched a wall, whatever the robot did before",
+        "spinner": "turned for the whole trial, less than "
+        f"{SPOT * 1000:.0f} mm from its start",
+        "stuck": f"was less than {SPOT * 1000:.0f} mm from its end for its last "
+        f"{LAST_TIME:.0f} s",
         "hugger": f"a wall follower with a mean clearance below {HUG * 1000:.0f} mm",
-        "wall follower": f"within {PROXIMITY_RANGE * 1000:.0f} mm of walls in "
-        f"{FOLLOWING_SHARE:.0%} of the time from the first on, {FOLLOWING_TIME:.0f} s "
-        f"at least, making way along them at {FOLLOWING_SPEED:.0%} of the top speed",
-        "circler": "went round in the open, which walls only touch",
-        "bouncer": f"from wall to wall, {BOUNCES} visits at least",
-        "searcher": "met no wall, or too late to tell what it does there",
+        "wall follower": f"within {PROXIMITY_RANGE * 1000:.0f} mm of walls for at "
+        f"least {FOLLOWING_SHARE:.0%} of the time since the first wall, which is at "
+        f"least {FOLLOWING_TIME:.0f} s, and making progress along walls at "
+        f"{FOLLOWING_SPEED:.0%} of the top speed or faster",
+        "circler": "drove round in the open, with at most one visit to a wall a round",
+        "bouncer": f"drove from wall to wall, with at least {BOUNCES} visits",
+        "searcher": "met no wall, or met one too late to tell what it does there",
         OTHER: "none of these",
     }
 )

@@ -195,7 +195,7 @@ def _visits(distance: np.ndarray) -> np.ndarray:
     """Number of visits `(n,)` to walls, from clearance `(n, rows)`."""
     near = distance <= PROXIMITY_RANGE
     decided = near | (distance >= LEAVING_CLEARANCE)
-    # in between, what was decided last holds
+    # between the two limits, the last decision holds
     last = np.maximum.accumulate(np.where(decided, np.arange(near.shape[1]), 0), axis=1)
     visiting = np.take_along_axis(near, last, axis=1)
     return visiting[:, 0] + (visiting[:, 1:] & ~visiting[:, :-1]).sum(axis=1)

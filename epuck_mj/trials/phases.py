@@ -35,7 +35,7 @@ def phases(trajectory: Trajectory, clearance: np.ndarray) -> np.ndarray:
 def _turn(trajectory: Trajectory) -> np.ndarray:
     """Net turn in the CORNERING_TIME around each row [rad], `(T + 1,)`."""
     time, yaw = trajectory.time, np.unwrap(trajectory.pose[:, 2])
-    # the ends stand still
+    # beyond both ends, the yaw stays the same
     before, after = (
         np.interp(time + side * CORNERING_TIME / 2, time, yaw) for side in (-1, 1)
     )

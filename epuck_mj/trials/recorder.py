@@ -91,7 +91,7 @@ def record_trajectories(
     trials = _recorded(robots, Everybody(policy), starts, task, disturbances, rows)
     trajectories = []
     for i, lived in enumerate(trials.steps.tolist()):
-        # what is sensed has one row more than what is decided
+        # readings have one row more than actions
         own = {
             name: array[i, : lived + array.shape[1] - steps].copy()
             for name, array in rows.items()
@@ -121,7 +121,7 @@ def record_lessons(
         "fitness": np.zeros((n, steps)),
     }
     trials = _recorded(robots, policy, starts, task, disturbances, rows)
-    # nothing is decided on what was seen at a trial's end
+    # the last observation of a trial leads to no action
     ends = np.arange(n), trials.steps
     rows["observation"][ends] = 0.0
     return trials, rows["observation"][:, :-1], rows["fitness"]

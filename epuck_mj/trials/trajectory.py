@@ -139,6 +139,6 @@ def hidden_outputs(policy: Policy, observations: np.ndarray) -> np.ndarray:
         observations: `(T, 8)`.
     """
     if isinstance(policy, Controller | WithChanges):
-        # bit for bit: it acts the same alone and in a crowd
+        # the same bits, alone or among other robots
         return policy.activation(observations)
     return np.zeros((len(observations), 0))

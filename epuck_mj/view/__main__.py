@@ -59,7 +59,7 @@ class Options:
 
 
 def view(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(Options, "python -m epuck_mj.view", argv, examples=EXAMPLES)
     check_flag("seed", options.seed)
     policy: Policy = WallFollower()
@@ -81,7 +81,7 @@ def view(argv: Sequence[str]) -> int:
         task = replace(task, steps=steps)
     if options.robot == KINEMATIC_ROBOT:
         print(f"{KINEMATIC_ROBOT} is shown on wheels, as MuJoCo moves it", flush=True)
-    # physics is for a command that makes sense
+    # slow to import: after the checks of the command line
     from epuck_mj.rungs.watched_robot import WatchedRobot
     from epuck_mj.scene.model import load_scene
     from epuck_mj.view.window import open_window, watch
@@ -120,7 +120,7 @@ def _evolved_with(champion: Path) -> Conditions | None:
             fields.get("randomise_all", False),
         )
     except (KeyError, ValueError) as error:
-        raise UserError(f"'{config}' is no config of a run: {error}") from None
+        raise UserError(f"'{config}' is not the config of a run: {error}") from None
 
 
 def _starts(scene: "Scene", options: Options) -> Iterator[np.ndarray]:

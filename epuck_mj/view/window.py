@@ -40,7 +40,7 @@ class Clock:
         if left > 0:
             time.sleep(left)
         elif left < -LATE_MAX:
-            # after a pause of the machine, no rush to catch up
+            # after a pause of the computer, do not catch up
             self._due = time.perf_counter()
 
 

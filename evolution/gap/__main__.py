@@ -31,7 +31,7 @@ class GapOptions:
         paths: run or study directories, controller files, or wall-follower.
         output: folder for gap.md, summary.md, gap.json, gap.csv and figures.
         worlds: number of worlds of each kind.
-        starts: number of test starts in each world and at home.
+        starts: number of test starts in each world and in the arena of evolution.
         robot: robot that drives; epuck_kinematic and epuck if not given.
         speeds: drive every policy at these full speeds, too, if it is faster [m/s].
         threads: threads that step the robots; 0 is one per core. Changes no result.
@@ -47,7 +47,7 @@ class GapOptions:
 
 
 def measure_gap(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(GapOptions, "python -m evolution.gap", argv, examples=EXAMPLES)
     check_flag("worlds", options.worlds)
     check_flag("starts", options.starts, "worlds")
@@ -65,7 +65,7 @@ def measure_gap(argv: Sequence[str]) -> int:
     except UserError as problem:
         if options.robot:
             raise
-        # on wheels only, where that is possible
+        # on wheels only, if all arenas allow that
         robots = [WHEELED_ROBOT]
         check_homes(policies, robots)
         print(f"not driven on {KINEMATIC_ROBOT}: {problem}", file=sys.stderr)

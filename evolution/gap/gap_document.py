@@ -99,38 +99,41 @@ def gap_document(gaps: Sequence[Gap]) -> list[Block]:
     blocks: list[Block] = [
         Heading("The reality gap", 1),
         Paragraph(
-            f"{len(first.names)} policies, frozen, in {first.latency.size} worlds of a "
-            f"Latin hypercube of each kind, on {first.starts} starts, which are others "
-            "in each world. In each column: mean step fitness, and the share of the "
-            "trials that end in a crash. Home: the arena that a policy evolved in, "
-            "ideal sensors and motors, as many test starts. Kept: the share of the "
-            "fitness at home, in the first kind of worlds."
+            f"{len(first.names)} policies, unchanged, in {first.latency.size} worlds "
+            f"of each kind, drawn as a Latin hypercube, on {first.starts} starts, "
+            "which differ from world to world. In each column: mean step fitness, and "
+            "the share of the trials that end in a crash. Home is the arena that a "
+            "policy evolved in, with ideal sensors and motors and as many test starts. "
+            "Kept is the fitness in the first kind of worlds as a share of the fitness "
+            "at home."
         ),
         gap_summary(gaps),
         Paragraph(
-            "Medians over the policies of an experiment, of their means. Usual worlds "
-            "share ranges with evolution: those of wheel radius, track, mass, friction "
-            "and latency with randomise, and those of body, sensors' place, light, "
-            "battery and slipping start with randomise_all as well. Whoever evolved on "
-            "such robots is at home there. In the second kind, every range that can be "
-            "is half as wide again. The third kind has the usual ranges, in the arenas "
+            "Each number is the median over the policies of an experiment of their "
+            "means. Usual worlds share ranges with evolution: those of wheel radius, "
+            "track, mass, friction and latency with randomise, and those of body, "
+            "sensors' place, light, battery and slipping start with randomise_all as "
+            "well. Policies that evolved on such robots have met such differences "
+            "before. In the second kind, every range that can be wider is half as wide "
+            "again. The third kind has the usual ranges, in the arenas "
             + ", ".join(KINDS["corners"].arenas)
             + "."
         ),
         Heading("Latency"),
         Paragraph(
             "Fitness and crashes in the usual worlds where commands reach the wheels "
-            "so many control steps late."
+            "this many control steps late."
         ),
         by_latency(first),
         Heading("What is kept"),
         Paragraph(
-            "In the usual worlds. Kept is the share of the fitness at home, or of an "
-            "ideal robot's in that world's arena if that is more: walls are found "
-            "sooner in a smaller arena. A slow policy has little to lose. A world is "
-            f"mastered with at least {SHARE_KEPT:.0%} kept and fewer than "
-            f"{COLLISIONS_MAX:g} collision per minute; against home, if the fitness at "
-            "home is all that counts."
+            "In the usual worlds. Kept is the fitness in the world as a share of a "
+            "reference: the fitness at home, or the fitness of an ideal robot in that "
+            "world's arena if that is higher (in a smaller arena, robots find walls "
+            "sooner). A slow policy has little to lose. A policy masters a world if it "
+            f"keeps at least {SHARE_KEPT:.0%} and has fewer than {COLLISIONS_MAX:g} "
+            "collision per minute. Against home: worlds mastered if the reference is "
+            "always the fitness at home."
         ),
         kept_table(first),
         Paragraph(
@@ -175,8 +178,9 @@ def _ranks(gap: Gap) -> list[Block]:
     return [
         Heading("Ranks"),
         Paragraph(
-            "Rank correlations (Spearman) of fitness, among policies of one full speed "
-            "only: a slower one earns less at home and keeps more of it anywhere."
+            "Rank correlations (Spearman) of fitness, among policies with the same "
+            "full speed only: slower policies earn less at home and keep more of it "
+            "in every world."
         ),
         Listing(items),
     ]

@@ -81,7 +81,7 @@ def abroad(
     for world in worlds:
         scene, period = _scene(world, robot)
         robots = robots_in(scene, n, threads)
-        # the same for most policies, and slow
+        # slow, and the same for most policies
         free = cache(FreeSpace)
         outcomes = []
         for policy in policies:
@@ -111,7 +111,7 @@ def _outcome(tracks: Tracks, period: float) -> Outcome:
     lived = tracks.steps.sum() * period
     duration = tracks.fitness.shape[1] * period
     return Outcome(
-        # a crash ends the earning, not the time
+        # after a crash, the rest of the time earns nothing
         fitness=float(tracks.trial_fitness.mean() * period / duration),
         collisions_per_minute=float(60 * tracks.crashed.sum() / lived),
         crash_rate=float(tracks.crashed.mean()),

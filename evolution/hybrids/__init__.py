@@ -1,1 +1,1 @@
-"""Evolution that learns, held against DE/best and against its controls."""
+"""Evolution that learns, compared with DE/best and with its controls."""

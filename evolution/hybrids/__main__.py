@@ -35,7 +35,7 @@ class HybridsOptions:
 
 
 def report_hybrids(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(
         HybridsOptions, "python -m evolution.hybrids", argv, examples=EXAMPLES
     )
@@ -50,7 +50,7 @@ def report_hybrids(argv: Sequence[str]) -> int:
     data = load_study(options.study)
     if BASE not in data.with_runs:
         raise UserError(
-            f"expected runs of '{BASE}' to hold others against, got "
+            f"expected runs of '{BASE}' to compare others with, got "
             + ", ".join(data.with_runs)
         )
     figures = {"worth": worth_figure(data), "sweep": sweep_figure(data)}

@@ -1,4 +1,4 @@
-"""What hybrids are worth: against DE/best, and rules against the perturbation."""
+"""Comparisons of hybrids with DE/best, and of rules with the perturbation."""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from evolution.statistics.targets import evaluations_to_target
 from evolution.study.data import StudyData
 
 BASE = "de-best"
-"""Experiment that all others are held against."""
+"""Experiment that all others are compared with."""
 
 CONTROL = "perturbation"
 """Rule that is the control of all others."""
@@ -38,8 +38,8 @@ class Compared:
 
     Attributes:
         name: experiment.
-        other: the one that it is held against.
-        runs: the fewer of theirs.
+        other: the one that it is compared with.
+        runs: number of runs of the one that has fewer.
         shift: of the first against the second, and the test that there is none.
         p: of a difference, Holm-adjusted in its family.
     """
@@ -61,7 +61,7 @@ class Compared:
 
 
 def against_base(data: StudyData) -> list[Compared]:
-    """All experiments that are no shares of a rule against DE/best, one family."""
+    """Every experiment against DE/best, except variations of the share; one family."""
     names = [
         name for name in data.with_runs if name != BASE and not _is_share(data, name)
     ]
@@ -69,7 +69,7 @@ def against_base(data: StudyData) -> list[Compared]:
 
 
 def against_control(data: StudyData) -> list[Compared]:
-    """Each rule against the perturbation of that inheritance and share, one family."""
+    """Each rule against the perturbation with its inheritance; one family."""
     runs = data.with_runs
     learning = {name: rule_of(data, name) for name in runs if not _is_share(data, name)}
     controls = {
@@ -94,7 +94,7 @@ def rule_of(data: StudyData, name: str) -> LifetimeLearningParameters | None:
 def sweep(data: StudyData) -> dict[str, dict[float, np.ndarray]]:
     """Held-out fitness on wheels by rule and by the share of the budget for lessons.
 
-    What is inherited was learnt; share 0 is DE/best.
+    Only experiments with Lamarckian inheritance; share 0 is DE/best.
     """
     found: dict[str, dict[float, np.ndarray]] = {}
     for name in data.with_runs:

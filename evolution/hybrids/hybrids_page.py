@@ -44,11 +44,11 @@ def hybrids_page(data: StudyData, pictures: Sequence[Picture]) -> list[Block]:
         verdicts_table(data, against_base(data)),
         Heading("Learning rules against their control"),
         Paragraph(
-            "The control spends the same trials on random perturbations of the same "
-            "length, and keeps the better of a pair."
+            "The control spends as many trials on random perturbations of the same "
+            "length as the rules' steps, and keeps the better of each pair."
         ),
         verdicts_table(data, against_control(data)),
-        Heading("How much of the budget"),
+        Heading("How much of the budget for lessons"),
         sweep_table(data),
         *others,
     ]

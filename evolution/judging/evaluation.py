@@ -3,9 +3,10 @@
 Two engines with the same bits: `batch` steps all robots at once on
 `mujoco.batch.Batch`; `dm_control` steps the dm_control task, one trial after another.
 
-Racing: an individual that only matters if it exceeds a known fitness is ended as soon
-as it cannot reach that any more, since no control step is worth more than 1. One that
-exceeds it has all its trials, so every comparison has the same outcome.
+Racing: some individuals matter only if they exceed a known fitness. The trials of such
+an individual end as soon as it cannot exceed that fitness any more, since no control
+step is worth more than 1. An individual that exceeds it has all its trials, so every
+comparison has the same outcome.
 """
 
 from collections.abc import Iterator
@@ -171,7 +172,7 @@ class BatchEngine:
                 work.controller, work.starts, work.disturbances, race.trials, needed
             )
         if work.race is not None and work.race.trials > self._robots.capacity:
-            # an individual does not fit: none is ended early
+            # too few robots for all trials of an individual: no trial is ended early
             work = replace(work, race=None)
         parts = [
             run_trials(
@@ -210,7 +211,7 @@ class DmControlEngine:
         """
         if work.disturbances is not None:
             raise ValueError("expected no disturbances with engine dm_control")
-        # dm_control for those who use it
+        # dm_control is slow to import
         from epuck_mj.environments.dm_control import (
             FollowWalls,
             PhysicsError,

@@ -156,7 +156,7 @@ class Scores(_Record, frozen=True):
         if best is not None and best.stored != self.stored:
             lines.append(
                 f"The highest fitness that evolution stored was {best.stored:.1f}, of "
-                f"an individual that fresh starts give {best.held_out:.1f}"
+                f"an individual that earns {best.held_out:.1f} on fresh starts"
             )
         return "\n".join(lines)
 

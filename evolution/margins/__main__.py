@@ -24,7 +24,7 @@ class MarginsOptions:
 
     The numbers are the radius of the body, how far the sensors are set back, and by
     how many control steps commands come late. Trials are on the kinematic robot.
-    Writes margins.parquet to the study; its report shows it.
+    Writes margins.parquet to the study; the report of the study shows it.
 
     Attributes:
         study: study directory.
@@ -38,7 +38,7 @@ class MarginsOptions:
 
 
 def measure_margins(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(
         MarginsOptions, "python -m evolution.margins", argv, examples=EXAMPLES
     )

@@ -78,7 +78,7 @@ Run = Callable[[BatchEngine, np.ndarray], tuple[np.ndarray, np.ndarray]]
 def _margins(setting: Setting, n: int, threads: int, run: Run) -> Iterator[Margin]:
     task = setting.task
     scene = load_scene(KINEMATIC_ROBOT, setting.arena, task.control_step)
-    # the same starts for all: where the robot of evolution has room
+    # the same starts for all changes: poses where the robot of evolution has room
     starts = starts_for_test(FreeSpace(scene, setting.start_clearance), n)
     for name, change in CHANGES.items():
         for amount in change.amounts:

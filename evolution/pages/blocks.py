@@ -205,7 +205,7 @@ def to_html(title: str, blocks: Sequence[Block]) -> str:
             case Table():
                 kind = "table wide" if _letters(block) > WIDE else "table"
                 made = re.sub(f"(?<= ){BOUNDS}(?=</td>)", r"<span>\g<0></span>", made)
-                # what scrolls can be reached by keys
+                # scrolling elements can be reached with the keyboard
                 scroll = f'<div class="scroll" tabindex="0">\n{made}</div>'
                 return f'<div class="{kind}">{scroll}</div>\n'
         return made
@@ -234,7 +234,7 @@ def _words(cell: str) -> list[str]:
 
 
 def _figure(picture: Picture) -> str:
-    # as an image its names cannot meet those of another figure
+    # as images, figures cannot clash by equal names inside
     data = base64.b64encode(picture.svg).decode()
     return (
         f'<figure><img alt="{html.escape(picture.name)}" '

@@ -37,7 +37,7 @@ PRINT: dict[Any, Any] = {
     "hatch.linewidth": 0.5,
     "legend.frameon": False,
     "legend.handlelength": 2.6,
-    # letters as shapes look the same wherever they are opened
+    # letters as shapes look the same on every computer
     "svg.fonttype": "path",
     # equal figures make equal files
     "svg.hashsalt": "epuck-mj",
@@ -91,7 +91,7 @@ LOOKS: Mapping[str, Look] = {
 }
 """Looks of shipped experiments; others take a spare look."""
 
-# without yellow, which white paper swallows
+# without yellow, which can hardly be seen on white paper
 SPARE_COLORS = (colors.SKY, colors.ORANGE, colors.PURPLE)
 SPARE_LINES = (
     ("-", "P"),

@@ -16,7 +16,7 @@ EXAMPLES = (
 
 
 def replay(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     check_ending("save", options.save, ".rrd")
     check_ending("video", options.video, ".mp4")
@@ -28,7 +28,7 @@ def replay(argv: Sequence[str]) -> int:
             "wall-follower or a trajectory (.npz)"
         )
     conditions = options.robots.conditions
-    # physics and pictures only for a command that makes sense
+    # slow to import: after the checks of the command line
     from evolution.named_policies import named_policies
     from evolution.replay.choices import scene_for, starts_for
     from evolution.replay.output import Replay, outcome, show, text_panel

@@ -92,8 +92,8 @@ def scene_for(options: Options, policies: Sequence[NamedPolicy]) -> Scene:
     arenas = dict.fromkeys(policy.arena for policy in policies) or {"arena": None}
     if options.arena is None and len(arenas) > 1:
         raise UserError(
-            f"evolved in different arenas ({', '.join(arenas)}): expected --arena to "
-            "say in which they are to be compared"
+            f"the policies evolved in different arenas ({', '.join(arenas)}): expected "
+            "--arena with the arena in which to compare them"
         )
     control_steps = {policy.task.control_step for policy in policies} or {0.1}
     if len(control_steps) > 1:
@@ -126,14 +126,14 @@ def starts_for(
                 "expected --pose with x [m], y [m] and heading [degrees], got "
                 + " ".join(f"{number:g}" for number in options.pose)
             )
-        # it meets what test start 0 does
+        # it has the disturbances of test start 0
         return Starts(("pose",), _pose(scene, *options.pose)[None])
     if options.trials is not None and options.trials < 1:
         raise UserError(f"expected at least 1 trial, got {options.trials}")
     if not policies:
-        # recorded trajectories have none
+        # recorded trajectories need no starts
         return Starts((), np.zeros((0, 3)))
-    # the widest: a start that is free for one is free for all
+    # the largest clearance: a start that is free with it is free for all
     clearance = max(policy.start_clearance for policy in policies)
     if options.starts is not None:
         return numbered_starts(options.starts, scene, clearance)

@@ -21,11 +21,11 @@ class Options:
     Attributes:
         path: run directory, controller file, wall-follower, or a recorded trajectory
             (.npz) of a simulated or a real robot.
-        compare: more of these, shown in the same arena at the same time.
+        compare: more paths, shown in the same arena at the same time.
         generations: show the best individuals of these generations instead of the
             champions: numbers from 0 on, or last, separated by commas.
-        trials: number of trials, on the first test starts; if not given, one trial on
-            that of the first 25 on which the policy has its median fitness.
+        trials: number of trials, on the first test starts; if not given, one trial,
+            on the start among the first 25 where the policy has its median fitness.
         starts: starts to use instead, such as test:0-9 or validation:7.
         pose: one start to use instead: x [m], y [m] and heading [degrees].
         robot: robot that drives.

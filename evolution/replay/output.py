@@ -92,7 +92,7 @@ def _make_folder(path: Path) -> None:
 
 
 def _draw(path: Path, replay: Replay) -> None:
-    # OpenGL and matplotlib only for those who want them
+    # OpenGL and matplotlib are slow to import
     from epuck_mj.show.pictures import save_figure
     from epuck_mj.show.still import DPI, still
 

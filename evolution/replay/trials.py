@@ -72,7 +72,7 @@ def from_file(path: str) -> Trial:
         UserError: if it is none.
     """
     trajectory = Trajectory.load(path)
-    # a trajectory does not say how long it might have been
+    # a trajectory does not have the planned number of steps
     task = TaskParameters(steps=max(1, trajectory.steps))
     return Trial(Path(path).stem, trajectory, task)
 

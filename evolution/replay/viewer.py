@@ -47,7 +47,7 @@ def open_viewer(recording: Path) -> str | None:
     with tempfile.TemporaryFile() as output:
         try:
             viewer = subprocess.Popen(
-                # nobody else is to reach it
+                # no other computer can connect
                 [viewer_binary(), "--bind", "127.0.0.1", recording],
                 stdin=subprocess.DEVNULL,
                 stdout=output,

@@ -70,7 +70,7 @@ def headless_viewer(recording: Path, size: tuple[int, int]) -> Iterator["ViewerC
                 *("--bind", "127.0.0.1", "--port", str(port)),
                 *("--window-size", f"{size[0]}x{size[1]}"),
             ],
-            # nothing of a person's own settings, and no calls home
+            # without the user's settings, and without analytics
             env={
                 **os.environ,
                 **{"HOME": home, "XDG_RUNTIME_DIR": home},
@@ -89,7 +89,7 @@ def headless_viewer(recording: Path, size: tuple[int, int]) -> Iterator["ViewerC
                 )
             try:
                 client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
-                # it answers before it knows whether it can paint
+                # the viewer answers before it knows whether it can draw
                 client.take_screenshot()
                 state = client.get_state()
             except Exception:  # rerun's own have no common base
@@ -127,7 +127,7 @@ def _until(attempt: Callable[[], Value | None]) -> Value:
 
 
 def picture_viewer(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(
         ViewerPictureOptions, "python -m evolution.replay.viewer_picture", argv
     )

@@ -35,7 +35,7 @@ class ReportOptions:
 
 
 def report_study(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(
         ReportOptions, "python -m evolution.report", argv, examples=EXAMPLES
     )

@@ -1,4 +1,4 @@
-"""Experiments held against each other, pair by pair.
+"""Experiments compared pair by pair.
 
 Of one question, a measure or a criterion on a robot, there are two families: all pairs
 of the study's first three experiments, and each other experiment with the first. P
@@ -20,7 +20,7 @@ COMPARED_PAIRWISE = 3
 
 @dataclass(frozen=True, eq=False)
 class Contest:
-    """Two experiments held against each other.
+    """Two experiments that are compared.
 
     Attributes:
         a: name of the first experiment.
@@ -42,12 +42,12 @@ class Contest:
 
     @property
     def enough(self) -> bool:
-        """Whether there are runs enough for a verdict."""
+        """Whether there are enough runs for a verdict."""
         return min(self.of_a.size, self.of_b.size) >= FEWEST_FOR_STARS
 
     @property
     def decided(self) -> bool:
-        """Whether they say that the two differ."""
+        """Whether the runs show that the two differ."""
         return self.enough and self.p_holm < LEVELS[0]
 
 

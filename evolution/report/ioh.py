@@ -92,7 +92,7 @@ def improvements(run: RunData) -> list[tuple[int, float]]:
     # readers take the last row for the length of the run
     rises[-1] = True
     curve = [(int(n), float(y)) for n, y in zip(spent[rises], best[rises], strict=True)]
-    # and a run to begin where evaluations are 1
+    # readers expect a run to begin at evaluation 1
     return curve if curve[0][0] == 1 else [(1, LOWEST), *curve]
 
 

@@ -7,7 +7,7 @@ from evolution.pages.words import robot_name
 from evolution.study.data import StudyData
 
 BEST_STORED = "best stored"
-"""Measure of the paper: the highest fitness that a run believed in."""
+"""Measure of the paper: the highest fitness that a run stored."""
 
 BOOTSTRAP_SEED = 0
 """Seed of the resamples of each interval: none depends on the rows before it."""

@@ -35,8 +35,8 @@ def write_report(study: Path, output: Path, ioh: bool = False) -> tuple[str, ...
         (output / FIGURES_FOLDER).mkdir(parents=True, exist_ok=True)
         pictures, lacking = draw_figures(data, output)
         if not data.yardstick:
-            where = "not tested in the setting of all"
-            lacking.append(f"{YARDSTICK}: {where}, nothing can be held against it")
+            where = "not tested in the setting of the runs"
+            lacking.append(f"{YARDSTICK}: {where}, so nothing can be compared with it")
         data = replace(data, missing=(*data.missing, *lacking))
         for name, text in tables(data).items():
             files.write_text(output / name, text)
@@ -79,7 +79,7 @@ def draw_figures(data: StudyData, output: Path) -> tuple[dict[str, Picture], lis
         except StopIteration:
             return found, []
         except UserError as error:
-            # the arena of another machine; all else can be shown
+            # the arena may be on another machine; everything else can be shown
             return found, [f"not all figures could be drawn: {error}"]
         write_figure(figure, folder, name)
         found[name] = Picture(name, caption, (folder / f"{name}.svg").read_bytes())

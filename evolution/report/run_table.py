@@ -62,17 +62,17 @@ RUN_COLUMNS: Mapping[str, Column[RunData]] = {
     "stored": (
         lambda run: run.scores.stored,
         FITNESS,
-        "stored fitness of the champion, what evolution believed",
+        "stored fitness of the champion",
     ),
     "validation": (
         lambda run: run.scores.validation,
         FITNESS,
-        "the champion on the starts that chose it",
+        "mean of the champion over the validation starts",
     ),
     "best_stored": (
         lambda run: float(run.history["best"].max()),
         FITNESS,
-        "highest stored fitness that the run believed in, what the paper reports",
+        "highest stored fitness of the run, which the paper reports",
     ),
     "evaluations": (
         lambda run: int(run.history["evaluations"][-1]),
@@ -82,7 +82,7 @@ RUN_COLUMNS: Mapping[str, Column[RunData]] = {
     "control_steps": (
         lambda run: run.control_steps,
         "control steps",
-        "those of all trials of the evolution",
+        "control steps of all trials of evolution",
     ),
     "path": (lambda run: run.path.as_posix(), "", "name of the run for commands"),
 }
@@ -124,7 +124,7 @@ def _run_row(data: StudyData, name: str, run: RunData) -> dict[str, Any]:
         for column, (value, _, _) in TEST_COLUMNS.items():
             row[f"{prefix}_{column}"] = value(test)
     row |= {column: value(run) for column, (value, _, _) in RUN_COLUMNS.items()}
-    # nan is what the champion's file does not say
+    # nan stands for values that the champion's file does not have
     return {
         column: None if isinstance(value, float) and math.isnan(value) else value
         for column, value in row.items()

@@ -29,7 +29,7 @@ def crash_rates(tests: Sequence[HeldOut]) -> np.ndarray:
 
 
 def known(values: Sequence[float]) -> np.ndarray:
-    """Those of the values that are not nan, `(n,)`."""
+    """The values that are not nan, `(n,)`."""
     return np.array([value for value in values if not math.isnan(value)])
 
 
@@ -123,7 +123,7 @@ BUDGETS = (3_000, 6_000, 9_000, 15_000)
 
 
 def best_after(runs: Sequence[RunData], budget: int) -> np.ndarray:
-    """Best stored fitness after so many evaluations, `(runs,)`; 0 if none yet."""
+    """Best stored fitness after a number of evaluations, `(runs,)`; 0 if none yet."""
     return np.array(
         [
             run.history["best"][run.history["evaluations"] <= budget].max(initial=0)

@@ -84,7 +84,7 @@ def _experiment(data: StudyData, name: str) -> dict[str, Any]:
             robot: {
                 "fitness": _described(data.held_out(name, robot)),
                 "crash_rate": _described(crash_rates(tests_of(data, name, robot))),
-                # of experiments with noise, stored fitness is another quantity
+                # with noise, stored fitness cannot be compared with tests without noise
                 "share_of_stored": None
                 if with_noise(data, name)
                 else _described(kept(data.held_out(name, robot), stored)),

@@ -51,7 +51,7 @@ class ReproduceOptions:
 
 
 def reproduce_paper(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(
         ReproduceOptions, "python -m evolution.reproduce", argv, examples=EXAMPLES
     )
@@ -96,7 +96,7 @@ def reproduce_paper(argv: Sequence[str]) -> int:
     try:
         unevolved = [first_generation(config, name) for name in FORMULAS]
     except UserError as error:
-        # the arena of another machine; all else can be shown
+        # the arena may be on another machine; everything else can be shown
         print(f"missing: the first generation: {error}", file=sys.stderr)
         unevolved = []
     wheels = others[0] if others else None

@@ -42,7 +42,7 @@ def claim_of(
     judged: Callable[[], tuple[str, str]],
     quantity: str = "",
 ) -> Claim:
-    """Make a claim about one algorithm.
+    """A claim about one algorithm, with what we found and the verdict.
 
     Args:
         text: what the paper says.

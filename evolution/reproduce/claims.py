@@ -117,7 +117,7 @@ They say where evolution runs and how a champion is chosen and tested.
 
 
 def unlike(study: StudyData) -> list[str]:
-    """Differences of experiments from the paper's, but for `FREE`, a line each."""
+    """Differences of experiments from the paper's, without `FREE`, a line each."""
     shipped, lines = papers_experiments(), []
     for name in PAPERS:
         if name not in study.configs:
@@ -213,7 +213,7 @@ def _stays_apart(shares: dict[str, np.ndarray]) -> list[Claim]:
 def _together(stored: dict[str, np.ndarray]) -> list[Claim]:
     """The paper's three best fitnesses tested together.
 
-    Each alone may be luck; what they say together is that our GA is not theirs.
+    Each difference alone may be luck. Together they show that our GA is not theirs.
     """
     names = " > ".join(LABELS[name] for name in PAPER_BEST)
     text = f"The best of {REPLICATES} runs each: {names}"

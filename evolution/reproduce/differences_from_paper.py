@@ -27,7 +27,7 @@ DIFFERENCES = (
     (
         "crash",
         "not said what counts",
-        "the shell touches a wall, however briefly",
+        "any touch of the shell on a wall, however short",
     ),
     (
         "fitness",
@@ -41,7 +41,7 @@ DIFFERENCES = (
         "not said",
         "{best.bounds_rule} between parent and bound",
     ),
-    ("DE's r1, r2, r3", "random", "unlike each other and the parent"),
+    ("DE's r1, r2, r3", "random", "different from each other and from the parent"),
     (
         "GA",
         "binary; tournament size not legible, operators not said",

@@ -1,7 +1,7 @@
 """Claims that DE has mature individuals earlier than a GA.
 
-By a run's own end, which favours whoever stops improving, and by a target and a budget
-that are the same for all.
+Maturity is measured by a run's own end, which favours runs that stop improving, and by
+a target and a budget that are the same for all.
 """
 
 from collections.abc import Mapping
@@ -73,8 +73,8 @@ def mature_by_own_end(early: dict[str, np.ndarray], name: str) -> Claim:
 def mature_by_fixed_measures(study: StudyData) -> list[Claim]:
     """Claims by a fixed target and a fixed budget: the strict readings.
 
-    A run's own end favours whoever stops improving, and says nothing of the GA, with
-    which the paper compares.
+    A run's own end favours runs that stop improving. It does not compare with the GA,
+    as the paper does.
     """
     target, budget = MATURE_TARGET * study.steps, MATURE_BUDGET
     spent = samples_of(study, lambda name: spent_until(study, name, target))
@@ -104,7 +104,7 @@ def mature_by_fixed_measures(study: StudyData) -> list[Claim]:
         for (pair, where, samples, ours), adjusted in zip(
             found, p.tolist(), strict=True
         )
-        # of the two DE variants the paper says nothing
+        # the paper does not compare the two DE variants
         if pair in PAIRS
     ]
 
@@ -141,7 +141,7 @@ def _count(sample: np.ndarray) -> str:
 
 
 def spent_until(study: StudyData, name: str, target: float) -> np.ndarray:
-    """Evaluations until a stored fitness, `(runs,)`; `NEVER` for those that never."""
+    """Evaluations until a stored fitness, `(runs,)`; `NEVER` if it was not reached."""
     spent = [
         evaluations_to_target(run.history["evaluations"], run.history["best"], target)
         for run in study.runs[name]

@@ -28,7 +28,7 @@ VARIATIONS = ("variations", "steps-150", "steps-500")
 """Studies of the paper's algorithms with one thing changed at a time."""
 
 HYBRIDS, GOOD_ROBOT = "hybrids", "good-robot"
-"""Studies of evolution that learns, and of what it taught, with a page of their own."""
+"""Studies of evolution that learns, and of the experiment `best`; they have a page."""
 
 OTHERS = (TRANSFER, REAL_ROBOTS, HYBRIDS, GOOD_ROBOT)
 """All that are not reported."""
@@ -54,7 +54,7 @@ class PublishOptions:
 
 
 def publish(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     parse(
         PublishOptions, "python -m evolution.reproduce.publish", argv, PublishOptions()
     )
@@ -94,7 +94,7 @@ def ship(source: Path, target: Path) -> None:
 
     Runs that the copy has already are replaced, and its other runs stay.
     """
-    # arrow is for a command that makes sense
+    # pyarrow is slow to import
     from evolution.study.packing import pack
 
     study, copies = StudyDirectory(source), StudyDirectory(target)

@@ -59,9 +59,9 @@ def reproduction(
     blocks: list[Block] = [
         Heading("Reproduction", 1),
         Paragraph(
-            "A replication with another simulator and our own code of a study that is "
-            "probably Cruz-Alvarez, Montes-Gonzalez, Mezura-Montes and Santos (MICAI "
-            "2012). Made by"
+            "A replication, with another simulator and our own code, of a study that "
+            "is probably Cruz-Alvarez, Montes-Gonzalez, Mezura-Montes and Santos "
+            "(MICAI 2012). This page was written by"
         ),
         Code([made_by]),
         *_provisional(study),
@@ -70,31 +70,33 @@ def reproduction(
         *_there(study),
         Heading("How verdicts are given"),
         Paragraph(
-            "n counts runs; below 10 there is no verdict. An order is decided by a "
-            "Mann-Whitney p below 0.05, Holm-adjusted for the three pairs of the "
-            "paper's algorithms (difference of medians and A12 with 95 % bounds); "
-            "a statement about runs by Wilson's 95 % bounds on one side of one half. "
-            "A maximum of the paper, taken for the best of three runs, is inconsistent "
-            "if the best of three of our own would have so extreme a rank among ours "
-            "with p < 0.05, two-sided. Else nothing contradicts it, which is weaker "
+            "n is the number of runs; with fewer than 10 there is no verdict. An order "
+            "is decided if a Mann-Whitney p is below 0.05, Holm-adjusted for the three "
+            "pairs of the paper's algorithms. The difference of medians and A12 are "
+            "given with 95 % bounds. A statement about runs is decided if both of "
+            "Wilson's 95 % bounds are on the same side of one half. A maximum of the "
+            "paper is taken for the best of three runs. It is inconsistent if the best "
+            "of three of our own runs would have so extreme a rank among ours with "
+            "p < 0.05, two-sided. Otherwise nothing contradicts it. This is weaker "
             "than what other claims have to show: a maximum above all of ours stays "
-            f"undecided, and below {fewest_to_contradict(REPLICATES)} runs no maximum "
-            "is too high."
+            f"undecided, and with fewer than {fewest_to_contradict(REPLICATES)} runs "
+            "no maximum can be shown to be too high."
         ),
         Heading("The paper's claims"),
         Paragraph(
-            f"Of {len(found)}: {counts}. Fitness is stored fitness here, as the paper "
-            "measured it. DE's mean is that of draws which were kept for being lucky, "
-            "the GA's of fresh ones: part of what sets them apart is luck. "
-            "Behaviour is that of the champion chosen on validation starts, which is "
-            "a better one than the individual with the highest stored fitness (see "
-            "what stored fitness hides)."
+            f"Of {len(found)} claims: {counts}. Fitness is stored fitness here, as the "
+            "paper measured it. DE keeps the stored fitness of its individuals, so "
+            "lucky values stay in its population mean. The GA's mean is over new "
+            "evaluations. So part of the difference between their means is luck. "
+            "Behaviour is that of the champion, which was chosen on "
+            "validation starts. It is better than the individual with the highest "
+            "stored fitness (see the section What stored fitness hides)."
         ),
         _claims(found),
         Heading("The same order by fresh starts"),
         Paragraph(
-            "What the paper could not see: champions on 1,000 starts that evolution "
-            "never met. Decided as in the report."
+            "The paper did not measure this: the fitness of champions on 1,000 starts "
+            "that evolution never used. Verdicts are given as in the report."
         ),
         *(_claims(held_out_order(study, robot)) for robot in shown_robots(study)),
         Heading("What stored fitness hides"),
@@ -126,7 +128,7 @@ PLANNED = 100
 
 
 def _provisional(study: StudyData) -> list[Block]:
-    """What is said of a study of the paper with fewer runs than planned."""
+    """Note about a study of the paper with fewer runs than planned."""
     fewest = min(len(study.runs.get(name, ())) for name in PAPERS)
     if fewest >= PLANNED or unlike(study):
         return []
@@ -161,7 +163,7 @@ def runs_table(study: StudyData) -> Table:
 
 
 def medians_table(study: StudyData, robot: str) -> Table:
-    """Medians over the runs of every experiment with runs, for a reader in a hurry."""
+    """Medians over the runs of every experiment with runs, in few columns."""
     rows = [
         [
             label(study, name),
@@ -182,8 +184,8 @@ def _there(study: StudyData) -> list[Block]:
     blocks: list[Block] = [
         runs_table(study),
         Paragraph(
-            f"{SPREAD}. Held-out: the champion's mean on fresh starts; best stored: "
-            "the highest fitness that a run believed in."
+            f"{SPREAD}. Held-out: the champion's mean on fresh starts. Best stored: "
+            "the highest fitness that a run stored."
         ),
     ]
     if study.missing:
@@ -215,9 +217,9 @@ def _hidden(study: StudyData) -> list[Block]:
             )
     return [
         Paragraph(
-            "The individual with the highest stored fitness of each run, which is what "
-            f"the paper reports, and what fresh starts on {robot} say of it; "
-            f"then the champion, chosen on validation starts. {SPREAD}."
+            "Of each run: the individual with the highest stored fitness, which the "
+            f"paper reports, and its fitness on fresh starts on {robot}; then the same "
+            f"of the champion, which was chosen on validation starts. {SPREAD}."
         ),
         Table(
             [
@@ -269,10 +271,11 @@ def _unevolved(found: Sequence[FirstGeneration], steps: int) -> list[Block]:
     ]
     return [
         Paragraph(
-            "The best of a first generation, drawn at random, by the fitness as "
-            f"printed (literal) and by the prose (product), of {steps}, and what it "
-            "does. The paper's curves rise; by the printed equation there is next to "
-            "nothing left to evolve."
+            "The best individual of a first generation, drawn at random, by the "
+            "equation as printed (literal) and by the paper's prose (product). Fitness "
+            f"is at most {steps}. The last column says how the individual behaves. In "
+            "the paper, fitness rises during evolution. By the printed equation, the "
+            "first generation is almost at the maximum, so fitness could hardly rise."
         ),
         Table(["fitness", "individuals", "best", "on fresh starts", "behaviour"], rows),
     ]

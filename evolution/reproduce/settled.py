@@ -25,7 +25,7 @@ POWER = 0.8
 """Probability with which more runs should show something."""
 
 MANY = 10_000
-"""So many runs are not named: nobody would do them."""
+"""Numbers of runs above this are not named: they are too many to be done."""
 
 
 def settled_blocks(
@@ -53,7 +53,9 @@ def settled_blocks(
     blocks += _list(f"On new starts, on {WHEELED_ROBOT}:", settled)
     blocks += _list("Claims of the paper that hold here:", holds)
     blocks += _list("Claims of the paper that do not hold here:", fails)
-    blocks += _list("Claims that nothing contradicts, which is weaker:", may)
+    blocks += _list(
+        "Claims that nothing contradicts here, which is a weaker result:", may
+    )
     blocks += [Heading("What is not settled, and what would settle it")]
     blocks += _list(f"On new starts, on {WHEELED_ROBOT}:", open_)
     blocks += _list(
@@ -61,10 +63,10 @@ def settled_blocks(
     )
     blocks.append(
         Paragraph(
-            "No run can settle what the paper does not say: the length of a trial, the "
-            "size of the tournament, what happens to weights that leave their bounds. "
-            "The study of variations changes each of these in turn. Runs of the "
-            "original program, or its source, would settle them."
+            "Our runs cannot settle what the paper does not say: the length of a "
+            "trial, the size of the tournament, what happens to weights that leave "
+            "their bounds. The study of variations changes each of these in turn. Runs "
+            "of the original program, or its source, would settle them."
         )
     )
     return blocks
@@ -76,7 +78,7 @@ def _list(title: str, lines: Sequence[str]) -> list[Block]:
 
 
 def _settled(study: StudyData, pair: Comparison) -> str | None:
-    """What a pair of algorithms settles; None if nothing."""
+    """What is settled about a pair of algorithms; None if nothing is."""
     if pair.a12.value < 0.5:
         pair = pair.turned()
     a, b = label(study, pair.a), label(study, pair.b)
@@ -97,7 +99,7 @@ def _settled(study: StudyData, pair: Comparison) -> str | None:
 
 
 def _open(study: StudyData, pair: Comparison) -> str | None:
-    """What a pair of algorithms leaves open, and how many runs would settle it."""
+    """What is open about a pair of algorithms, and how many runs would settle it."""
     if pair.enough and (pair.decided or pair.equivalent):
         return None
     a, b = label(study, pair.a), label(study, pair.b)
@@ -114,8 +116,8 @@ def _open(study: StudyData, pair: Comparison) -> str | None:
 def runs_needed(pair: Comparison) -> int | None:
     """Runs of each that show a difference or equivalence with a probability of 80 %.
 
-    If the shift stays what it is and the interval narrows with the root of the number
-    of runs. None if nothing is known of the spread.
+    This assumes that the shift stays the same and that the interval narrows with the
+    root of the number of runs. None if nothing is known of the spread.
     """
     found, n = pair.equivalence, min(pair.of_a.size, pair.of_b.size)
     half = (found.high - found.low) / 2
@@ -126,7 +128,7 @@ def runs_needed(pair: Comparison) -> int | None:
     level = normal.inv_cdf(1 - LEVELS[0] / pair.family) + normal.inv_cdf(POWER)
     standard_error = half / normal.inv_cdf(0.5 + CONFIDENCE / 2)
     needed = max(n + 1, math.ceil(n * (level * standard_error / away) ** 2))
-    # two digits say enough
+    # rounded up to two digits
     step = 10 ** max(0, len(str(needed)) - 2)
     return math.ceil(needed / step) * step
 
@@ -134,4 +136,4 @@ def runs_needed(pair: Comparison) -> int | None:
 def _shift(pair: Comparison) -> str:
     found = pair.equivalence
     bounds = between(Interval(found.shift, found.low, found.high), ".1f")
-    return f"shift {found.shift:z.1f}, 90 % interval {bounds}"
+    return f"estimated difference {found.shift:z.1f}, 90 % interval {bounds}"

@@ -1,9 +1,9 @@
-"""Verdicts on claims: what runs have to show for or against one.
+"""Verdicts on claims: what runs have to show for or against a claim.
 
-As in the report, fewer than 10 runs of an algorithm give none. An order needs
-a Mann-Whitney p below 0.05, adjusted for the pairs of its kind. A statement about every
-run needs a Wilson interval on one side of one half. The best of the paper's few runs
-needs a rank among ours that is not too extreme.
+As in the report, there is no verdict with fewer than 10 runs of an algorithm. An order
+needs a Mann-Whitney p below 0.05, adjusted for the pairs of its kind. A statement about
+every run needs a Wilson interval on one side of one half. The best of the paper's few
+runs needs a rank among ours that is not too extreme.
 """
 
 from math import floor
@@ -47,7 +47,7 @@ def of_most(holds: np.ndarray) -> tuple[str, str]:
 def of_best(sample: np.ndarray, best: float, replicates: int) -> tuple[str, str]:
     """The rank of the best of other runs among ours, and the verdict on it.
 
-    At best, our runs do not contradict that it came from runs like ours. A best above
+    At most, our runs do not contradict that it came from runs like ours. A best above
     all of ours may still be luck: with a probability of 3 / (n + 3), the best of three
     more runs like ours exceeds all `n`.
 

@@ -69,7 +69,7 @@ class Options:
 
 
 def evolve(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status.
+    """Run the command line and return its exit status.
 
     Raises:
         UserError: for anything the user can put right.
@@ -104,7 +104,7 @@ def evolve(argv: Sequence[str]) -> int:
 def _run(
     options: Options, directory: RunDirectory, argv: Sequence[str], progress: Progress
 ) -> int:
-    """Begin the run, or go on with it; the exit status."""
+    """Begin the run, or go on with it, and return the exit status."""
     # a simulator costs seconds to load
     from evolution.run.execution import Run
     from evolution.run.means import Means
@@ -174,7 +174,7 @@ def _kind(config: ExperimentConfig) -> type[Options]:
 
 
 def _carry_out(run: "Run", live: bool, progress: Progress) -> int:
-    """Evolve, then choose and show the champion; the exit status."""
+    """Evolve, choose and show the champion, and return the exit status."""
     evolution, directory = run.evolution, run.directory
     started = time.monotonic()
     with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:

@@ -38,7 +38,7 @@ class Champion:
 
     Attributes:
         genome: its weights, `(genes,)`.
-        stored_fitness: what evolution believed of it.
+        stored_fitness: what evolution stored for it.
         validation_fitness: its mean on the validation starts.
     """
 
@@ -67,7 +67,7 @@ class Stored:
 
 
 def stored_by(evolution: Evolution) -> Stored:
-    """What a run has stored by now; of one that has climbed, since then."""
+    """What a run has stored so far; if it has climbed, since the climb."""
     same = [record.climbed == evolution.climbed for record in evolution.records]
     first = same.index(True)
     return Stored(
@@ -145,7 +145,7 @@ def _validated(
     """Mean fitness of genomes `(k, genes)` on `n` validation starts, `(k,)`."""
     config = evolution.config
     starts = starts_for_validation(evolution.space, n)
-    # as it was evolved: robots that are disturbed alike
+    # with the disturbances of evolution
     met = held_out_disturbances(
         config.conditions, Purpose.VALIDATION, len(starts), config.steps
     )

@@ -115,7 +115,7 @@ class RunDirectory:
 
     @property
     def begun(self) -> bool:
-        """Whether there is a run that can be gone on with."""
+        """Whether there is a run that can be continued."""
         return files.is_file(self.config) or files.is_file(self.checkpoint)
 
     def refuse_other_config(self, config: ExperimentConfig) -> None:
@@ -147,15 +147,15 @@ class RunDirectory:
             self.restore_checkpoint(evolution)
         elif files.is_file(self.champion) or files.is_file(self.history):
             raise UserError(
-                f"cannot resume '{self.path}': without '{self.checkpoint.name}' the "
-                "run could only begin again, over what is there: remove it, or begin "
-                "in another directory"
+                f"cannot resume '{self.path}': '{self.checkpoint.name}' is missing, so "
+                "the run would begin again and overwrite its files: remove the "
+                "directory, or choose another one"
             )
         with files.writing():
             files.remove_leftovers(self.path)
             if not files.is_file(self.config):
                 files.write_text(self.config, evolution.config.to_yaml())
-            # the run may have been killed between its files
+            # the run may have been killed after some of its files were written
             self._write_derived(evolution, ())
             resumed = [*first.get("resumed", ()), provenance]
             files.write_text(self.provenance, to_json({**first, "resumed": resumed}))
@@ -286,7 +286,7 @@ class RunDirectory:
         lost = {
             path.name: f"{path.name} is missing"
             for path in asked
-            # a file of no bytes is what some disks leave of one after a power cut
+            # after a power cut, some disks leave an empty file
             if not files.is_file(path) or not path.stat().st_size
         }
         for path, read in (

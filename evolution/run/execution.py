@@ -93,7 +93,7 @@ class Run:
             config, means.engine, means.threads, means.racing, loaded.place
         )
         self.directory = directory
-        # found out now, not after the evolution
+        # checked now, not after evolution
         scene = self.evolution.scene
         self._judges = loaded.judges.tested_on(config.robot, config.setting)
         self.notes = tuple(_notes(config, loaded.judges))

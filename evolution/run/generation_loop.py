@@ -111,7 +111,7 @@ class Evolution:
             else engine
         )
         self.engine = self._maker(self._evolved[0])
-        # that an individual can only lose shows only if fitness has a maximum
+        # racing needs the maximum of the fitness
         self.racing = racing and config.task.step_fitness.maximum is not None
         self.optimizer = _optimizer(config)
         self._threads = threads

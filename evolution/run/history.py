@@ -123,7 +123,7 @@ def timing_text(
         columns = csv_columns(before.read_text(encoding="utf-8", errors="replace"))
         numbers, each = (columns.get(name, []) for name in ("generation", "seconds"))
         for number, text in zip(numbers, each, strict=False):
-            # a row that was cut off says nothing
+            # ignore a row that was cut off
             with suppress(ValueError):
                 taken[int(number)] = f"{float(text):.3f}"
     first = len(records) - len(seconds)

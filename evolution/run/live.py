@@ -126,7 +126,7 @@ def _show(config: ExperimentConfig, port: int, generations: Any) -> None:
         print("The viewer was closed; the run continues", file=sys.stderr)
     except Exception:
         traceback.print_exc()
-    # rerun would wait for a viewer that has gone
+    # rerun would wait for a closed viewer
     os._exit(0)
 
 
@@ -136,7 +136,7 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
     Raises:
         ConnectionError: if the viewer was closed, or accepts nothing.
     """
-    # rerun is loaded by those who use it
+    # rerun is slow to import
     from epuck_mj.show.recording.live import LiveView
 
     scene = load_scene(config.robot, config.arena, config.control_step)

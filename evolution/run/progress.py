@@ -61,7 +61,7 @@ class Progress:
             self._next_line += self._budget / LINES
 
     def stage(self, text: str, number: int, stages: int) -> None:
-        """Show that the next stage begins, of so many that choose the champion.
+        """Show that the next stage of choosing the champion begins.
 
         Args:
             text: what is done in it.

@@ -39,7 +39,7 @@ Stage = Callable[[str, int, int], None]
 
 
 def silent(text: str, number: int = 0, stages: int = 0) -> None:
-    """A `Stage` that tells nobody."""
+    """A `Stage` that shows nothing."""
 
 
 def write_results(
@@ -135,7 +135,7 @@ def _chosen(
 ) -> Champion:
     """The champion; its engines, of hundreds of megabytes, end with the choice."""
     config, wheels = evolution.config, None
-    # chosen as evolved: a champion that needs the last bit of room is not wanted
+    # chosen with the margin of evolution, so that the champion keeps away from walls
     margin = config.body_margin
     scene = with_body_margin(evolution.scene, margin)
     engine = BatchEngine(scene, config.task, threads)

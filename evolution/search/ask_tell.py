@@ -126,10 +126,10 @@ def part_of(state: Mapping[str, np.ndarray], name: str) -> dict[str, np.ndarray]
 class Optimizer(ABC):
     """A population-based maximiser that asks for fitness and is told.
 
-    An algorithm draws the first population as it is made, and says in `propose` what is
-    asked after it, in `learn` what is made of what is told. What it keeps beside
-    population, fitness and `rng` goes into `arrays` and comes back by `load`; in
-    `to_beat` it says which fitness changes nothing, if it wants to be raced.
+    A subclass draws the first population when it is made. `propose` returns the genomes
+    of each later generation, and `learn` updates the state with their fitness. State
+    beside population, fitness and `rng` goes into `arrays` and is restored by `load`.
+    `to_beat` says which fitness changes nothing; only racing needs it.
 
     Attributes:
         rng: the source of all its randomness.
@@ -142,7 +142,7 @@ class Optimizer(ABC):
     """
 
     growth = 1
-    """A generation costs at most so many times as much as any that has been."""
+    """Most that a generation costs, as a multiple of the costliest one before it."""
 
     needs_lessons = False
     """Whether it wants lessons, which only the paper's network can be given."""
@@ -315,7 +315,7 @@ class Optimizer(ABC):
         return self._asked
 
     def replace_pending(self, genomes: np.ndarray) -> None:
-        """Put others in the place of the genomes that wait for their fitness.
+        """Replace the genomes that wait for their fitness.
 
         Raises:
             AskTellError: there are none, or not as many.

@@ -51,7 +51,7 @@ LEAST_STEP = 0.05
 """Least first step size there. Chosen: 0.5 % of the paper's bounds."""
 
 GROWTH = 2
-"""A restart has so many times as many individuals as the search before it."""
+"""Factor by which a restart increases the number of individuals."""
 
 
 def made_finite(fitness: np.ndarray) -> np.ndarray:
@@ -78,8 +78,8 @@ class CmaEsParameters:
         sigma: first step size of each start, above 0, at most the width of the bounds.
         restarts: start again when there is no more progress; otherwise continue.
         learning_rate_adaptation: learn more slowly the less of each change is more than
-            noise (LRA-CMA-ES). It takes the place of a larger population, so restarts
-            and their doubling are better off.
+            noise (LRA-CMA-ES). It takes the place of a larger population, so set
+            restarts to false.
         algorithm: the algorithm's name in configurations.
 
     Raises:
@@ -91,7 +91,7 @@ class CmaEsParameters:
     restarts: bool = True
     learning_rate_adaptation: bool = False
     algorithm: Literal["cma_es"] = "cma_es"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -133,7 +133,7 @@ class CmaEs(Optimizer):
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
         """Make the generation asked the current one; restart without progress."""
-        # it minimises
+        # the package minimises
         costs = (-made_finite(told)).tolist()
         self._cma.tell(list(zip(asked, costs, strict=True)))
         self._told.append(told)
@@ -222,7 +222,7 @@ class CmaEs(Optimizer):
         self, population: int, elite: tuple[np.ndarray, float] | None = None
     ) -> "CMA":
         """A new search with this population, at a random mean if at no elite's."""
-        # with scipy behind it: for those who use it
+        # it imports scipy, which is slow
         from evolution.search.symmetric_cma import SymmetricCma
 
         # fitness of the best and of the median individual of each of its generations

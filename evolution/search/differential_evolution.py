@@ -101,10 +101,10 @@ class DifferentialEvolutionParameters:
         reevaluate_parents: from the second generation on, evaluate parents and trial
             vectors together, and compare and store their new fitness only. A generation
             then costs 2 N evaluations.
-        reevaluate_best: from the second generation on, evaluate so many of the best
-            individuals again, together with the trial vectors. What is compared and
-            stored of an individual is the mean of all evaluations that it has had. A
-            generation costs so many evaluations more. Not with `reevaluate_parents`.
+        reevaluate_best: from the second generation on, evaluate this number of best
+            individuals again, together with the trial vectors. An individual's fitness
+            is then the mean of all its evaluations. A generation costs this number of
+            evaluations more. Not with `reevaluate_parents`.
         algorithm: the algorithm's name in configurations.
 
     Raises:
@@ -120,7 +120,7 @@ class DifferentialEvolutionParameters:
     reevaluate_parents: bool = False
     reevaluate_best: int = 0
     algorithm: Literal["differential_evolution"] = "differential_evolution"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -167,7 +167,7 @@ class DifferentialEvolution(Optimizer):
         self.stores_means = parameters.reevaluate_best > 0
         self._parameters = parameters
         self._space = space
-        # evaluations that each individual has had, whose mean is stored
+        # number of evaluations of each individual; their mean is stored
         self._evaluations = np.ones(parameters.population, dtype=np.int64)
 
     def next_size(self) -> int:
@@ -177,7 +177,7 @@ class DifferentialEvolution(Optimizer):
     def to_beat(self) -> np.ndarray:
         """See `Optimizer.to_beat`: a trial that does not beat its parent is forgotten.
 
-        Without a limit in the initial population, for those who are evaluated again,
+        Without a limit in the initial population, for individuals evaluated again,
         and for their trials, since it changes what these have to beat.
         """
         self.pending()
@@ -187,7 +187,7 @@ class DifferentialEvolution(Optimizer):
         return np.concatenate([np.full(len(again), -np.inf), parents])
 
     def _reevaluated(self) -> np.ndarray:
-        """Indices of those who are evaluated again in this generation, ascending."""
+        """Indices of the individuals to evaluate again, ascending."""
         parameters = self._parameters
         if self.generation == 0:
             return np.arange(0)
@@ -196,7 +196,7 @@ class DifferentialEvolution(Optimizer):
         return best_of(self.fitness, parameters.reevaluate_best)
 
     def propose(self) -> np.ndarray:
-        """The trials, after those who are evaluated again."""
+        """The trial vectors, after the individuals that are evaluated again."""
         return np.concatenate([self.population[self._reevaluated()], self._trials()])
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
@@ -250,7 +250,7 @@ class DifferentialEvolution(Optimizer):
     def arrays(self) -> dict[str, np.ndarray]:
         """See `Optimizer.arrays`."""
         arrays = super().arrays()
-        # without means it is of no use
+        # only means need it
         if self.stores_means:
             arrays["evaluations"] = self._evaluations.copy()
         return arrays

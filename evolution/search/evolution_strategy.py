@@ -76,7 +76,7 @@ class EvolutionStrategyParameters:
     bounds_rule: str = "reflect"
     reevaluate_parents: bool = True
     algorithm: Literal["evolution_strategy"] = "evolution_strategy"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:

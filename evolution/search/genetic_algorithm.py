@@ -158,9 +158,9 @@ class GeneticAlgorithmParameters:
         mutation: probability in [0, 1] that a bit is flipped.
         elites: number of best individuals that enter the next generation unchanged.
             They are evaluated again, so an elite can lose its place by bad luck.
-        coding: of a gene's level in bits: binary, or gray, in which levels that follow
-            one another differ in one bit.
-        crossover_points: 1, tails are exchanged, or 2, middles are.
+        coding: how a gene's level is written in bits: binary, or gray, in which
+            neighbouring levels differ in one bit.
+        crossover_points: 1 (tails are exchanged) or 2 (middles are exchanged).
         algorithm: the algorithm's name in configurations.
 
     Raises:
@@ -176,7 +176,7 @@ class GeneticAlgorithmParameters:
     coding: str = "binary"
     crossover_points: int = 1
     algorithm: Literal["genetic_algorithm"] = "genetic_algorithm"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -251,7 +251,7 @@ class GeneticAlgorithm(Optimizer):
     def arrays(self) -> dict[str, np.ndarray]:
         """See `Optimizer.arrays`."""
         arrays = super().arrays()
-        # of which the genomes follow
+        # genomes are decoded from them
         del arrays["population"]
         return {**arrays, "chromosomes": self._chromosomes.copy()}
 

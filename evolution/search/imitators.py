@@ -1,4 +1,4 @@
-"""Imitators: networks that were taught to act as the hand-written wall follower.
+"""Imitators: networks that were taught to act like the hand-written wall follower.
 
 The first and only generation: random genomes, each taught by gradient on what the
 follower did in some trials, which are paid. It is a beginning for other searches, see
@@ -27,7 +27,7 @@ class ImitatorsParameters:
     """Parameters of imitators.
 
     Attributes:
-        population: number of them, at least 1.
+        population: number of imitators, at least 1.
         demonstrations: evaluations in which the wall follower drives, at least 1.
         learning_rate: first length of the steps of a weight, which falls to 0.
         algorithm: the algorithm's name in configurations.
@@ -40,7 +40,7 @@ class ImitatorsParameters:
     demonstrations: int = 20
     learning_rate: float = 0.1
     algorithm: Literal["imitators"] = "imitators"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:

@@ -126,7 +126,7 @@ def with_archived(
         archive: `(n, genes)`, at most `capacity`.
         beaten: to add `(k, genes)`; where there is no place left, one after the other
             takes the place of a random one.
-        capacity: at most so many.
+        capacity: largest number of genomes in it.
         rng: draws those places.
     """
     free = capacity - len(archive)
@@ -138,7 +138,7 @@ def with_archived(
 
 
 def reduced_size(initial: int, evaluations: int, budget: int) -> int:
-    """Individuals after so many evaluations, from `initial` to 4: equation (10)."""
+    """Individuals after a number of evaluations, from `initial` to 4: equation (10)."""
     size = round((MIN_POPULATION - initial) / budget * evaluations + initial)
     return max(size, MIN_POPULATION)
 
@@ -170,7 +170,7 @@ class LShadeParameters:
     memory: int = 6
     budget: int = 0
     algorithm: Literal["l_shade"] = "l_shade"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -207,7 +207,7 @@ class LShade(Optimizer):
         self._archive = np.empty((0, space.genes))
         self._scales = np.full(parameters.memory, FIRST_MEMORY)
         self._crossovers = np.full(parameters.memory, FIRST_MEMORY)
-        # the pair that is written next
+        # index of the pair that is written next
         self._oldest = 0
         # F and CR of the trials that were asked last
         self._f = self._cr = np.empty(0)

@@ -26,7 +26,7 @@ IMITATION_STEPS = 10
 """Number of gradient steps in one lesson of imitation."""
 
 EVERY = 10
-"""An imitator looks at one control step of so many: neighbours are alike."""
+"""An imitator uses one of this number of control steps: neighbours are alike."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def by_policy_gradient(genomes: np.ndarray, given: Given) -> np.ndarray:
 
 
 def by_imitation(genomes: np.ndarray, given: Given) -> np.ndarray:
-    """Several small steps towards what the best does where the learners come."""
+    """Several small steps towards the actions that the best would take instead."""
     network = given.lessons.network
     lives = [given.lessons.live(genomes, 0.0) for _ in range(COST)]
     seen = np.concatenate([life.observation for life in lives], axis=1)[:, :, ::EVERY]

@@ -29,7 +29,7 @@ class Life:
     lived: np.ndarray
 
     def of(self, learners: int) -> Self:
-        """The same, as trials of so many learners whose copies followed one another."""
+        """The same trials by learner; copies of a learner follow one another."""
         each = (self.observation, self.tried, self.reward, self.lived)
         return type(self)(
             *(array.reshape(learners, -1, *array.shape[2:]) for array in each)

@@ -38,11 +38,12 @@ class LifetimeLearningParameters:
             best individual would do) or perturbation (try a random change).
         inheritance: lamarckian (what was learnt is inherited) or baldwinian (only its
             fitness counts).
-        learning_share: share of the evaluations that lessons cost, 0 to 2/3, where
-            every individual learns.
+        learning_share: share of the evaluations that lessons cost, from 0 to 2/3
+            (every individual learns).
         step: length of the change of a genome by a lesson.
-        exploration: standard deviation of what is added to the sums of v and w.
-        discount: of a reward one control step later.
+        exploration: standard deviation of the noise that is added to the weighted
+            sums of v and w.
+        discount: factor of a reward one control step later.
         algorithm: the algorithm's name in configurations.
 
     Raises:
@@ -57,7 +58,7 @@ class LifetimeLearningParameters:
     exploration: float = 1.0
     discount: float = 0.9
     algorithm: Literal["lifetime_learning"] = "lifetime_learning"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -95,7 +96,7 @@ class LifetimeLearning(AroundEvolution):
     def _learners(self) -> int:
         """Number of individuals that learn in the next generation; none in the first.
 
-        Of those who are only evaluated again none learns.
+        Individuals that are only evaluated again do not learn.
         """
         if self.generation == 0:
             return 0

@@ -30,7 +30,7 @@ class MemeticDeParameters:
 
     Attributes:
         evolution: parameters of the differential evolution.
-        refinements: generations of refinement after each of evolution.
+        refinements: generations of refinement after each generation of evolution.
         sigma: standard deviation of a candidate's genes around the individual's.
         algorithm: the algorithm's name in configurations.
 
@@ -42,7 +42,7 @@ class MemeticDeParameters:
     refinements: int = 3
     sigma: float = 0.3
     algorithm: Literal["memetic_de"] = "memetic_de"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -65,7 +65,7 @@ class MemeticDe(AroundEvolution):
         refuse_wide_steps(parameters.sigma, space)
         super().__init__("memetic-de", parameters.evolution, space, rng)
         self._parameters = parameters
-        # generations of refinement to come, and who is refined
+        # generations of refinement that are left, and the individuals that are refined
         self._left = 0
         self._refined = np.zeros(len(self.population), dtype=bool)
 
@@ -74,7 +74,7 @@ class MemeticDe(AroundEvolution):
         return int(self._refined.sum()) if self._left else super().next_size()
 
     def propose(self) -> np.ndarray:
-        """Candidates of those who are refined, or what evolution asks."""
+        """Candidates of the individuals that are refined, or what evolution asks."""
         if not self._left:
             return super().propose()
         known = self.population[self._refined]
@@ -87,7 +87,7 @@ class MemeticDe(AroundEvolution):
         return self.fitness[self._refined] if self._left else super().to_beat()
 
     def learn(self, asked: np.ndarray, told: np.ndarray) -> None:
-        """Replace those whose candidates are better, or tell evolution."""
+        """Replace individuals by better candidates, or tell evolution."""
         if self._left:
             who = np.flatnonzero(self._refined)
             better = told > self.fitness[who]
@@ -97,7 +97,7 @@ class MemeticDe(AroundEvolution):
             return
         before = self.population
         super().learn(asked, told)
-        # in the first generation nobody is accepted in place of another
+        # in the first generation no individual replaces another
         self._refined = (self.population != before).any(axis=1)
         self._left = self._parameters.refinements if self._refined.any() else 0
 

@@ -70,13 +70,13 @@ class OpenAiEsParameters:
     """Parameters of OpenAI's evolution strategy.
 
     Attributes:
-        pairs: mirrored pairs of a generation, at least 1. It has 2 pairs + 1
-            individuals.
+        pairs: mirrored pairs of a generation, at least 1. A generation has
+            2 pairs + 1 individuals.
         sigma: standard deviation of the samples around the centre, above 0, at most the
             width of the bounds.
         learning_rate: Adam's step size, above 0, at most the width of the bounds: the
             most that a gene of the centre usually moves in a generation.
-        weight_decay: the gradient is reduced by so much of the centre's genes.
+        weight_decay: the gradient is reduced by this share of the centre's genes.
         algorithm: the algorithm's name in configurations.
 
     Raises:
@@ -88,7 +88,7 @@ class OpenAiEsParameters:
     learning_rate: float = 0.2
     weight_decay: float = 0.0
     algorithm: Literal["openai_es"] = "openai_es"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:

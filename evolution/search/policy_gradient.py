@@ -31,8 +31,9 @@ class PolicyGradientParameters:
     Attributes:
         batch: evaluations in which the controller explores in each generation.
         learning_rate: of Adam: length of the steps of a weight.
-        exploration: standard deviation of what is added to the sums of v and w.
-        discount: of a reward one control step later.
+        exploration: standard deviation of the noise that is added to the weighted
+            sums of v and w.
+        discount: factor of a reward one control step later.
         algorithm: the algorithm's name in configurations.
 
     Raises:
@@ -44,7 +45,7 @@ class PolicyGradientParameters:
     exploration: float = 1.0
     discount: float = 0.95
     algorithm: Literal["policy_gradient"] = "policy_gradient"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:

@@ -55,7 +55,7 @@ def check_optimizer(algorithm: str, **parameters: Any) -> None:
         except Exception as error:
             why = " ".join(f"{type(error).__name__} {error}".split())
             raise UserError(
-                f"optimiser '{algorithm}': not so: {name} ({why})"
+                f"optimiser '{algorithm}': this does not hold: {name} ({why})"
             ) from None
 
 
@@ -65,7 +65,7 @@ def sphere(genomes: np.ndarray) -> np.ndarray:
 
 
 def evolved(optimizer: Optimizer, generations: int, fitness: Fitness = sphere):
-    """The optimiser itself, so many generations later."""
+    """The optimiser itself, after a number of generations."""
     for _ in range(generations):
         optimizer.tell(fitness(optimizer.ask()))
     return optimizer
@@ -92,7 +92,7 @@ def refused(kind: type[Exception], words: str, call: Callable[..., Any], *given:
     except kind as error:
         require(words in str(error), f"expected '{words}' in '{error}'")
     else:
-        raise AssertionError(f"{kind.__name__} expected, '{words}'")
+        raise AssertionError(f"expected {kind.__name__} with '{words}'")
 
 
 def same(a: Optimizer, b: Optimizer) -> None:
@@ -206,7 +206,7 @@ def _to_beat(make: Make) -> None:
         require(to_beat.shape == (len(genomes),), "not one value a genome")
         require(not np.isnan(to_beat).any(), "NaN is to beat")
         require(generation or (to_beat == -np.inf).all(), "something at first")
-        # the caller's to keep
+        # the caller may keep the array
         to_beat[:] = 99
         optimizer.tell(sphere(genomes))
     same(optimizer, evolved(make(), 4))
@@ -214,7 +214,7 @@ def _to_beat(make: Make) -> None:
 
 def _races(make: Make) -> None:
     def plateaus(genomes: np.ndarray) -> np.ndarray:
-        # many are told exactly what they have to beat
+        # many get exactly the fitness that they have to beat
         return np.round(sphere(genomes) / 4)
 
     for fitness in (sphere, plateaus):

@@ -41,7 +41,7 @@ class RandomSearchParameters:
 
     population: int = 100
     algorithm: Literal["random_search"] = "random_search"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:

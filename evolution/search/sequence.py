@@ -41,8 +41,8 @@ class SequenceParameters:
             imitators.
         then: parameters of the search that goes on: differential evolution, with as
             many individuals as the first, or CMA-ES.
-        share: of the evaluations, that the first spends, 0 to 1; at least one
-            generation.
+        share: share of the evaluations that the first search spends, 0 to 1; at
+            least one generation.
         budget: evaluations of both together; 0 is the run's.
         algorithm: the algorithm's name in configurations.
 
@@ -57,7 +57,7 @@ class SequenceParameters:
     share: float = 0.8
     budget: int = 0
     algorithm: Literal["sequence"] = "sequence"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -104,7 +104,7 @@ class Sequence(Optimizer):
         if not parameters.budget:
             raise ValueError("budget: expected the number of evaluations, got 0")
         own, then = rng.spawn(2)
-        # the second search is made of nothing but its parameters and this
+        # the second search depends only on its parameters and this
         self._birth = generator_state(then)
         # the same first population as without
         self._parts = (

@@ -95,10 +95,10 @@ class SsshcParameters:
     """Parameters of SSSHC.
 
     Attributes:
-        population: number of parents, at least 1. A selection costs twice as many
-            evaluations, a refinement as many.
+        population: number of parents, at least 1. A selection costs twice this
+            number of evaluations, a refinement this number.
         mutation: probability in [0, 1] that a gene of an offspring is drawn anew.
-        stochasticity: noise of the fitness in selection, in [0, 1], as a share of it.
+        stochasticity: noise of the fitness in selection, as a share of it, in [0, 1].
         refinements: generations of refinement after each selection; 0 is a steady state
             without hill climbing.
         algorithm: the algorithm's name in configurations.
@@ -112,7 +112,7 @@ class SsshcParameters:
     stochasticity: float = 0.1
     refinements: int = 1
     algorithm: Literal["ssshc"] = "ssshc"
-    # read by the configuration: a misspelt key is refused
+    # the configuration reads this: a misspelt key is refused
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -139,7 +139,7 @@ class Ssshc(Optimizer):
         super().__init__("ssshc", population, rng)
         self._parameters = parameters
         self._space = space
-        # evaluations that each parent has had, whose mean is stored
+        # number of evaluations of each parent; their mean is stored
         self._evaluations = np.zeros(parameters.population, dtype=np.int64)
 
     def next_size(self) -> int:

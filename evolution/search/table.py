@@ -143,7 +143,7 @@ def own_parameters(algorithm: str) -> type:
             parameters.__name__,
             [("algorithm", Literal[algorithm], field(default=algorithm))],
             bases=(parameters,),
-            # read by the configuration: a misspelt key is refused
+            # the configuration reads this: a misspelt key is refused
             namespace={
                 "__pydantic_config__": {"extra": "forbid"},
                 "__doc__": parameters.__doc__,

@@ -59,9 +59,9 @@ class ExperimentConfig(BaseModel):
     climb: Annotated[float, within("climb")] = Field(
         0.9,
         description="share of the evaluations that are spent on epuck_kinematic; the "
-        "rest is spent on epuck, where the population is evaluated anew, unless it is "
-        "too little for that; 1: all are spent on epuck_kinematic; without effect on "
-        "other robots",
+        "rest is spent on epuck, where the population is evaluated again, unless the "
+        "rest is too small for that; 1: all are spent on epuck_kinematic; without "
+        "effect on other robots",
     )
     arena: Annotated[str, word("ARENA")] = Field(
         "arena", description="name of a shipped arena or the path of an MJCF file"
@@ -70,12 +70,12 @@ class ExperimentConfig(BaseModel):
         5, description="trials per individual"
     )
     starts_every: Annotated[int, within("starts_every")] = Field(
-        1, description="trials get new starts in every so many generations"
+        1, description="number of generations after which trials get new starts"
     )
     own_starts: StrictBool = Field(
         False,
-        description="give each individual starts of its own, instead of the same to "
-        "all of a generation",
+        description="give each individual starts of its own; otherwise all individuals "
+        "of a generation have the same starts",
     )
     steps: Annotated[int, within("steps")] = Field(
         300, description="control steps per trial"
@@ -122,8 +122,9 @@ class ExperimentConfig(BaseModel):
     )
     body_margin: Annotated[float, within("body_margin")] = Field(
         0.0,
-        description="evolve robots whose body is so much wider on every side, so that "
-        "champions keep off walls [m]; they are chosen with it and tested without",
+        description="evolve robots whose body is wider by this margin on every side "
+        "[m], so that champions keep away from walls; champions are chosen with the "
+        "margin and tested without it",
     )
     network: NetworkName = Field(
         FEEDFORWARD,
@@ -151,9 +152,9 @@ class ExperimentConfig(BaseModel):
     )
     finalists: Annotated[int, within("finalists")] = Field(
         5,
-        description="number of the best on epuck_kinematic among which the champion "
-        "is chosen on epuck; 0: it is the best on epuck_kinematic; without effect on "
-        "other robots",
+        description="number of the best candidates on epuck_kinematic, among which the "
+        "champion is chosen on epuck; 0: the champion is the best on epuck_kinematic; "
+        "without effect on other robots",
     )
     test_starts: Annotated[int, within("test_starts")] = Field(
         N_TEST,

@@ -31,7 +31,7 @@ def check_needs(config: ExperimentConfig) -> None:
 def needs(config: ExperimentConfig) -> Iterator[tuple[dict[str, int], int]]:
     """The largest arrays: numbers multiplied there, and bytes of each entry."""
     optimizer = config.optimizer
-    # a user's optimiser may have none of them
+    # a user's optimiser may have none of these fields
     keys = [each for each in ("lineages", "pairs") if hasattr(optimizer, each)]
     key = keys[0] if keys else "population"
     individuals = getattr(optimizer, key, 1)
@@ -54,7 +54,7 @@ def needs(config: ExperimentConfig) -> Iterator[tuple[dict[str, int], int]]:
         yield population | {"bits": optimizer.bits} | weights, COPIES
         yield population | {"tournament": optimizer.tournament}, COPIES
     if isinstance(optimizer, LShadeParameters):
-        # it shrinks to so many
+        # its population shrinks to MIN_POPULATION
         generations = {
             f"evaluations / {MIN_POPULATION}": config.evaluations // MIN_POPULATION
         }

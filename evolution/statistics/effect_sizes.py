@@ -96,5 +96,7 @@ def _wins(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Wins of each pair `(..., n, m)`: 1 if the first is greater, 0.5 if they tie."""
     a, b = np.asarray(a, float)[..., :, None], np.asarray(b, float)[..., None, :]
     if not (a.size and b.size and np.isfinite(a).all() and np.isfinite(b).all()):
-        raise ValueError("expected samples of finite values, got none or others")
+        raise ValueError(
+            "expected samples of finite values, got an empty or another one"
+        )
     return (a > b) + 0.5 * (a == b)

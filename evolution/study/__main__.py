@@ -76,7 +76,7 @@ class Options:
 
 
 def study(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status, 1 if a run failed.
+    """Run the command line and return its exit status, 1 if a run failed.
 
     Raises:
         UserError: for anything the user can put right.
@@ -104,14 +104,14 @@ def study(argv: Sequence[str]) -> int:
             check_needs(each)
     directory = StudyDirectory(options.output)
     directory.open(config, seeds)
-    # arrow is for a command that makes sense
+    # pyarrow is slow to import: after the checks of the command line
     from evolution.study.packing import Packer
 
-    # what a process that was killed has finished, and studies of older versions
+    # pack runs of killed processes and of older versions
     packer = Packer(directory)
     packer.now()
     typed, there = tuple(argv), directory.tables.packed()
-    # all experiments of a seed before the next: a study cut short is still paired
+    # seed by seed, so that an interrupted study has the same seeds of all experiments
     everything = [
         Job(
             name,
@@ -133,7 +133,7 @@ def study(argv: Sequence[str]) -> int:
     with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:
         try:
             with interruption.raising():
-                # first: a study cut short has it, too
+                # first, so that an interrupted study has it, too
                 try:
                     _measure_yardstick(directory)
                 except UserError as error:

@@ -13,7 +13,7 @@ from evolution.run.directory import RunDirectory
 from evolution.study.directory import PREFIX, RUNNING, StudyDirectory
 
 if TYPE_CHECKING:
-    # arrow is for those who read tables
+    # pyarrow is slow to import
     from evolution.study.packed_run import PackedRun
 
 PlacedRun = Union[RunDirectory, "PackedRun"]

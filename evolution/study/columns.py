@@ -171,7 +171,7 @@ def rows_of(table: pa.Table) -> list[Row]:
     columns: dict[Place, list[Any]] = {}
     for field, column in zip(table.schema, table.columns, strict=True):
         stored = (field.metadata or {}).get(PLACE)
-        # a column that a person has added
+        # a column that a user has added
         if stored is not None:
             columns[tuple(json.loads(stored))] = column.to_pylist()
     if not columns:

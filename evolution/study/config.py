@@ -69,7 +69,7 @@ class StudyConfig:
                 f"'{path}': expected 'experiments', a list of experiments, got "
                 + shown(entries)
             )
-        # nothing behind the colon
+        # the key has no value
         common = {} if common is None else common
         if not isinstance(common, dict):
             raise UserError(

@@ -139,7 +139,7 @@ def load_study(path: Path) -> StudyData:
     asked = directory.asked_seeds()
     for name, experiment in config.experiments.items():
         finished = []
-        # those of killed studies, and of older ones
+        # runs of killed studies and of older studies
         unpacked: dict[int, list[RunDirectory]] = {}
         for seed, place in places[name]:
             unpacked.setdefault(seed, []).append(place)

@@ -44,7 +44,7 @@ class StudyDirectory:
     @property
     def tables(self) -> "Tables":
         """The tables of finished runs, which need not be there."""
-        # arrow is for those who read them
+        # pyarrow is slow to import
         from evolution.study.tables import Tables
 
         return Tables(self.path)
@@ -99,7 +99,7 @@ class StudyDirectory:
                 files.remove_leftovers(self.path)
                 asked = self.asked_seeds()
                 if not asked and files.is_file(self.config):
-                    # an older study did not say
+                    # older studies did not store it
                     begun = self.stored_config().experiments
                     asked = {n: there for n in begun if (there := self.seeds(n))}
                 for name in config.experiments:

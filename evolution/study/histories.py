@@ -115,7 +115,7 @@ def _part(experiment: str, seed: int, history: History) -> pa.Table:
         **history,
     }
     arrays = [
-        # nan is what is not known
+        # nan stands for unknown values
         pa.array(columns[field.name], from_pandas=True).cast(field.type)
         for field in SCHEMA
     ]
@@ -150,7 +150,7 @@ def histories_in(table: pa.Table) -> dict[Run, History]:
         rises = (np.diff(history["evaluations"], prepend=0) > 0).all()
         finite = all(np.isfinite(history[name]).all() for name in HISTORY)
         if run in found or not rises or not finite:
-            raise ValueError(f"the history of {run[0]} seed {run[1]} is no such")
+            raise ValueError(f"the history of {run[0]} seed {run[1]} is invalid")
         found[run] = history
     return found
 

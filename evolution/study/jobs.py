@@ -123,7 +123,7 @@ def generations(
     Raises:
         UserError: for anything the user can put right.
     """
-    # MuJoCo is for those who simulate: the study itself does not
+    # MuJoCo is slow to import, and the study's own process does not need it
     from evolution.run.execution import Run
 
     directory = job.run
@@ -131,7 +131,7 @@ def generations(
         begun = directory.begun
         if begun:
             directory.refuse_other_config(job.config)
-        # another process may have done it since the jobs were listed
+        # another process may have done this job since the jobs were listed
         if directory.finished or job.packed:
             return
         run = Run(job.config, directory, means, job.argv, loaded)
@@ -224,12 +224,12 @@ def _work(means: Means, line: Connection) -> None:
                 failure = failure_of(job, error)
             line.send(Event(job, ended=True, failure=failure))
     except (EOFError, BrokenPipeError, ConnectionResetError):
-        # the parent has gone: what is on disk can be resumed at any moment
+        # the parent has ended: the files on disk can be resumed at any moment
         os._exit(1)
 
 
 def _nothing_loaded(means: Means) -> "Loaded":
-    # MuJoCo is for those who simulate
+    # MuJoCo is slow to import
     from evolution.run.execution import Loaded
 
     return Loaded(means.threads)
@@ -262,5 +262,5 @@ def _die_with_parent() -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None
     wait([parent.sentinel])
-    # what is on disk can be resumed at any moment
+    # the files on disk can be resumed at any moment
     os._exit(1)

@@ -20,7 +20,7 @@ class Options:
     """Move the finished runs of a study from their folders into its tables.
 
     evolution.study does so by itself. Studies that older versions wrote have a folder
-    for each run; runs that are not finished move to running/ and can be gone on with.
+    for each run; runs that are not finished move to running/ and can be continued.
 
     Attributes:
         studies: study directories.
@@ -30,7 +30,7 @@ class Options:
 
 
 def pack_studies(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status, 1 if a finished run is in no table.
+    """Run the command line and return its exit status, 1 if some run is not packed.
 
     Raises:
         UserError: if no study is named, or one is none.
@@ -40,9 +40,9 @@ def pack_studies(argv: Sequence[str]) -> int:
         raise UserError("expected study directories")
     studies = [StudyDirectory(path) for path in options.studies]
     for study in studies:
-        # said before any work
+        # checked before any work
         study.stored_config()
-    # arrow is for a command that makes sense
+    # pyarrow is slow to import: after the checks of the command line
     from evolution.study.packing import pack
 
     left = 0

@@ -101,7 +101,7 @@ def _moved(directory: RunDirectory, target: RunDirectory) -> bool:
     """Move an unfinished run to where a study goes on with it, if it is not there."""
     if directory.path == target.path or target.path.exists() or not directory.begun:
         return False
-    # whoever works there is no process of this version
+    # a process of an older version may still work there
     with directory.locked():
         pass
     target.path.parent.mkdir(parents=True, exist_ok=True)
@@ -137,7 +137,7 @@ class Packer:
         self._cost = self._last - started
 
     def when_due(self) -> None:
-        """Pack if the last packing is long ago; what hinders it is left for later."""
+        """Pack if the last packing is long ago; try again later if it fails."""
         if time.monotonic() - self._last > SHARE * self._cost:
             with suppress(UserError):
                 self.now()

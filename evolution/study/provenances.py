@@ -38,7 +38,7 @@ def provenance_of(fields: Mapping[str, Any]) -> dict[str, Any]:
     parts = [fields, *fields.get("resumed", ())]
     first, *others = map(_shared, parts)
     entry = dict(first)
-    # of the times that it was gone on with, those under other circumstances
+    # resumptions with another code, version or processor
     differing: list[dict[str, Any]] = []
     for part in others:
         if part != first and part not in differing:

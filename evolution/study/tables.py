@@ -120,7 +120,7 @@ class Tables:
                 )
             try:
                 if histories and run not in read:
-                    raise UserError(f"'{self.history}' does not have it")
+                    raise UserError(f"'{self.history}' has no rows of it")
                 origin = row.get(("provenance",), "")
                 if origin not in provenances:
                     raise UserError(f"'{self.provenance}' has no id '{origin}'")

@@ -26,8 +26,8 @@ class VariationsOptions:
     is a variation of ga.
 
     Attributes:
-        studies: study directories; algorithms are held against the unchanged one with
-            trials of the same length.
+        studies: study directories; variations are compared with the unchanged
+            algorithm with trials of the same length.
         output: folder for variations.md, variations.html and the figure.
     """
 
@@ -36,7 +36,7 @@ class VariationsOptions:
 
 
 def report_variations(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(
         VariationsOptions, "python -m evolution.variations", argv, examples=EXAMPLES
     )

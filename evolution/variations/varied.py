@@ -108,7 +108,7 @@ class Order:
 
 
 def varied_of(studies: Sequence[StudyData]) -> list[Varied]:
-    """All variations in studies, each held against its unchanged algorithm.
+    """All variations in studies, each compared with its unchanged algorithm.
 
     Experiments that are not named after one of the paper's are left out.
     """

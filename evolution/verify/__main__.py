@@ -51,13 +51,13 @@ class Options:
 
 
 def verify(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     check_threads(options.threads)
     runs = [run for path in options.paths for run in _runs(path)]
     if not runs:
         raise UserError("expected run or study directories")
-    # what is damaged is said before an hour of work
+    # report damaged runs before an hour of work
     found: list[Written] = []
     for run in runs:
         try:
@@ -66,7 +66,7 @@ def verify(argv: Sequence[str]) -> int:
             print(f"{run.path}: {error}", flush=True)
     same = 0
     if found:
-        # simulators are for a command that makes sense
+        # simulators are slow to import: after the checks of the command line
         from evolution.judging.held_out import Judges
 
         judges = Judges(options.threads)

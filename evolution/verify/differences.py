@@ -37,14 +37,14 @@ def lines_of_differences(file: str, written: Any, now: Any) -> list[str]:
 
 
 def said(now: Any, written: Any) -> Any:
-    """What would be written now, without the keys that the file says nothing of."""
+    """What would be written now, without the keys that the file does not have."""
     if not (isinstance(now, Mapping) and isinstance(written, Mapping)):
         return now
     return {key: said(now[key], written[key]) for key in now if key in written}
 
 
 def unsaid(now: Any, written: Any, inside: str = "") -> list[str]:
-    """Keys that the file says nothing of, with dots in between."""
+    """Keys that the file does not have, with dots in between."""
     if not (isinstance(now, Mapping) and isinstance(written, Mapping)):
         return []
     keys = [f"{inside}{key}" for key in now if key not in written]

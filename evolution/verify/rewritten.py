@@ -171,7 +171,7 @@ def _histories(written: Written, evolution: Evolution) -> Iterator[str]:
         name, best = CHAMPIONS, [max(best[int(climbed.argmax()) :])][: len(fitness)]
     yield from lines_of_differences(name, {"fitness": fitness}, {"fitness": best})
     spent, config = int(written.history["evaluations"][-1]), evolution.config
-    # nobody knows how large an own optimiser's generations may be
+    # the size of the generations of a user's optimiser is not known
     own = is_own(config.optimizer.algorithm)
     left = config.evaluations - spent
     most = largest_generation(written.history, evolution.optimizer)
@@ -211,7 +211,7 @@ def stored_without_checkpoint(written: Written, evolution: Evolution) -> Stored:
         return Stored(*nobody, genomes, fitness, bool(climbed.any()))
     # it was the best of some generations, or it earned in one what it is believed
     as_best = fitness[(genomes == genome).all(axis=1)]
-    # an own optimiser may store what it likes
+    # a user's optimiser may store any individuals
     own = is_own(evolution.config.optimizer.algorithm)
     if believed not in as_best and not own:
         generation = written.history["generation"].astype(int)

@@ -25,7 +25,7 @@ def drive_alone(
     show: Show,
     clock: Callable[[], float] = time.monotonic,
 ) -> int:
-    """Drive, stop, write the log; the exit status.
+    """Drive, stop, write the log, and return the exit status.
 
     Args:
         mission: what to do.
@@ -46,7 +46,7 @@ def drive_alone(
             outcome = accomplish(mission, connect, terminal, interruption, clock)
         finally:
             terminal.end_line()
-        # a person has to know before pictures take time; stdout may be lost
+        # tell the user before the pictures, which take time; stdout may be lost
         if outcome.status:
             complain(outcome.word)
         else:
@@ -74,7 +74,7 @@ def drive_alone(
 
 
 class Terminal:
-    """A terminal, or a pipe: who watches a robot that drives alone."""
+    """Watcher of a robot that drives alone, on a terminal or a pipe."""
 
     def __init__(self, mission: Mission, output: Output, keys: Keyboard) -> None:
         """Say nothing yet."""

@@ -40,7 +40,7 @@ class Keyboard:
             return b""
         keys = _read(self._handle)
         if not keys:
-            # the terminal has gone
+            # the terminal was closed
             self._handle = None
         return keys
 
@@ -63,7 +63,7 @@ def keyboard() -> Iterator[Keyboard]:
         tty.setcbreak(handle, termios.TCSANOW)
         yield Keyboard(handle)
     finally:
-        # a terminal that has gone keeps no mode
+        # a closed terminal has no mode to restore
         with suppress(termios.error):
             termios.tcsetattr(handle, termios.TCSANOW, before)
 

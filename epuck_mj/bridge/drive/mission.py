@@ -58,18 +58,18 @@ class Mission:
 
 
 class Watcher(Protocol):
-    """Who watches a drive, and can end it."""
+    """Observer of a drive, which can end it."""
 
     def say(self, text: str) -> None:
-        """Take notice of a text."""
+        """Receive a text to show."""
         ...
 
     def met(self, greeting: Greeting, robot: RealRobot) -> None:
-        """Take notice that the robot answered; it drives when this returns."""
+        """Receive the news that the robot answered; it drives when this returns."""
         ...
 
     def saw(self, step: Step, robot: RealRobot) -> bool:
-        """Take notice of a control step; whether the drive has to end."""
+        """Receive a control step; return whether the drive has to end."""
         ...
 
 
@@ -101,7 +101,7 @@ def accomplish(
     interruption: Interruption,
     clock: Callable[[], float] = time.monotonic,
 ) -> Outcome:
-    """Drive, stop, write the arrays of the log; how it ended.
+    """Drive, stop, write the arrays of the log, and return how the drive ended.
 
     Args:
         mission: what to do.

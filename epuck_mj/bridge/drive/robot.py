@@ -85,8 +85,8 @@ class RealRobot:
             speed_max: no wheel rolls faster than this [m/s].
             dry_run: whether it has to stand still all the time.
             start: pose `(3,)`: x, y [m], yaw [rad].
-            clock: what all times are told by; the connection's.
-            sleep: lets so many seconds go by.
+            clock: returns the time [s]; the connection's clock.
+            sleep: waits for a number of seconds.
         """
         self._connection = connection
         self._calibration = calibration
@@ -129,7 +129,7 @@ class RealRobot:
             if self.met:
                 self._connection.stop()
         except StillMoving:
-            # it stood when it was met, and was told nothing else since
+            # the robot stood still when it answered, and got no other command since
             if self._driven:
                 raise
         finally:
@@ -171,11 +171,11 @@ class RealRobot:
         Raises:
             StaleReading: if there was no reading for READING_AGE_MAX.
             RobotRestarted: if it was reset.
-            LinkLost: if the port is gone.
+            LinkLost: if the port was lost.
         """
         rates = (0, 0) if self._dry_run else self.told(command)
         if rates != self._rates:
-            # unknown until it has answered
+            # unknown until the robot has answered
             self._cycle(rates, changed=True)
             self._rates = rates
         before = self._clock()

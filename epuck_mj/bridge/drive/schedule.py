@@ -25,7 +25,7 @@ class Schedule:
         Args:
             period: from tick to tick [s].
             clock: the time [s].
-            sleep: lets so many seconds go by.
+            sleep: waits for a number of seconds.
         """
         self._period = period
         self._clock = clock

@@ -67,10 +67,10 @@ class Options:
 
 
 def fake(argv: Sequence[str]) -> int:
-    """Run the command line; its exit status."""
+    """Run the command line and return its exit status."""
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
     _refuse_bad_options(options)
-    # physics is not for those who only ask for help
+    # slow to import, and not needed for --help
     from epuck_mj.bridge.fake.emulator import WIFI, Emulator
     from epuck_mj.bridge.fake.endpoints import Pty, Tcp, serve
     from epuck_mj.bridge.fake.simulated_body import SimulatedBody

@@ -53,7 +53,7 @@ class Pty:
         return str(self._link)
 
     def open(self) -> None:
-        """Appear."""
+        """Make the robot's port appear."""
         try:
             # not on Windows
             import tty
@@ -73,7 +73,7 @@ class Pty:
             raise
 
     def close(self) -> None:
-        """Vanish."""
+        """Make the robot's port disappear."""
         if not self.is_open:
             return
         self.is_open = False
@@ -155,7 +155,7 @@ class Tcp:
         """See Pty."""
         if not self.is_open:
             return []
-        # others wait in the queue until this one has gone
+        # other connections wait in the queue until this one is closed
         return [(self._host or self._server).fileno()]
 
     def receive(self) -> bytes:

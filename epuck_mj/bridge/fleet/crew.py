@@ -45,7 +45,7 @@ class Report:
         kind: MET, LINE, SAID or OVER of `driver`, or GONE.
         text: for a person.
         facts: summary of a drive that is over.
-        status: exit status of a driver that is gone.
+        status: exit status of a driver that has ended.
     """
 
     name: str
@@ -119,7 +119,7 @@ class Crew:
         )
 
     def report(self, seconds: float) -> Report | None:
-        """The next report, or None if there is none in so many seconds."""
+        """The next report, or None if none comes within a number of seconds."""
         try:
             report = self._reports.get(timeout=seconds)
         except queue.Empty:
@@ -131,7 +131,7 @@ class Crew:
     def go(self) -> None:
         """Let all robots drive."""
         for process in self._processes.values():
-            # one that has ended reports that
+            # a driver that has ended has reported it
             with contextlib.suppress(OSError):
                 stdin = _pipe(process.stdin)
                 stdin.write(GO)

@@ -1,9 +1,9 @@
 """Driver: the process of one robot of a fleet.
 
-It is told an order on its command line. It greets the robot and waits, with the robot
-standing, for GO on standard input. The end of standard input stops it at any time: the
-fleet wants that, or its process is gone. What happens is reported on standard output,
-a line of JSON each.
+The process gets an order on its command line. It greets the robot and waits, with the
+robot standing, for GO on standard input. The end of standard input stops the drive at
+any time: either the fleet wants that, or the fleet's process has ended. The driver
+reports on standard output, one line of JSON for each event.
 """
 
 import gc
@@ -41,7 +41,7 @@ MET, LINE, SAID, OVER = "met", "line", "said", "over"
 
 
 class Reporter:
-    """The fleet, as a driver sees it: who watches, says go, and stops it."""
+    """Watcher that reports to the fleet, waits for its GO, and obeys its stop."""
 
     def __init__(self, output: Output) -> None:
         """Report nothing yet."""
@@ -79,15 +79,15 @@ class Reporter:
 
 
 def drive(argv: Sequence[str]) -> int:
-    """Drive a robot as ordered; the exit status, as the bridge's."""
-    # beside the drive itself, nothing ends this process before its time
+    """Drive a robot as ordered and return the exit status of the bridge."""
+    # only the drive may end this process
     for signum in SIGNALS:
         signal.signal(signum, signal.SIG_IGN)
     order = Order.from_json(argv[0])
     with Output(sys.stdout) as output, Interruption() as interruption:
         reporter = Reporter(output)
         threading.Thread(target=reporter.listen, daemon=True).start()
-        # no search for garbage among what was loaded
+        # no garbage collection of loaded modules
         gc.freeze()
         try:
             outcome = accomplish(
@@ -101,7 +101,7 @@ def drive(argv: Sequence[str]) -> int:
             reporter.report(OVER, word, facts=facts)
             output.finish()
         except OutputLost:
-            # the fleet is gone; the robot stands
+            # the fleet has ended; the robot already stands still
             pass
     if status == RUNAWAY:
         leave_to_last_resort(order.port)

@@ -1,4 +1,4 @@
-"""A drive of a fleet: all robots answer, all start, and each ends by itself or all do.
+"""A drive of a fleet: all robots answer, all start; each can end alone, or all end.
 
 The keyboard and the signals are this process's: one key stops all.
 """
@@ -110,7 +110,7 @@ class FleetDrive:
         ready = not (self.ends or self._late or self.stopped)
         if self._keys.there and ready:
             self._screen.say(
-                f"All {len(orders)} robots answer. Put each where it shall start.\n"
+                f"All {len(orders)} robots answer. Put each where it is to start.\n"
                 "Enter starts all of them. q, space or Ctrl-C ends."
             )
             self._until(
@@ -127,7 +127,7 @@ class FleetDrive:
         self._until(lambda: not self._crew.there)
 
     def hear(self, report: Report) -> None:
-        """Take what a driver reports."""
+        """Handle the report of a driver."""
         name, text = report.name, report.text
         if report.kind == MET:
             self._met[name] = text
@@ -182,7 +182,7 @@ class FleetDrive:
 
 
 def drive_fleet(orders: Mapping[str, Order], shows: Mapping[str, Show]) -> int:
-    """Drive robots, stop them, write their logs; the exit status.
+    """Drive robots, stop them, write their logs, and return the exit status.
 
     Args:
         orders: by the robots' names.

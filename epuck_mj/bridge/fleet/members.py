@@ -93,7 +93,7 @@ def _checked(members: list[Member], where: str) -> tuple[Member, ...]:
         )
     names: dict[str, str] = {}
     for member in members:
-        # names of files, some of which do not know small letters from large
+        # names become file names, and some file systems ignore case
         for key, what in ((member.port, "port"), (member.name.lower(), "name")):
             other = names.setdefault(f"{what} {key}", member.name)
             if other is not member.name:

@@ -69,11 +69,11 @@ class Screen:
 
     @property
     def lost(self) -> bool:
-        """Whether standard output is gone, and nobody sees this."""
+        """Whether standard output is closed, so nobody sees the screen."""
         return self._output.lost
 
     def _write(self, text: str) -> None:
-        # whoever drives looks at `lost`
+        # the fleet checks `lost`
         with contextlib.suppress(OutputLost):
             self._output.say(text)
 

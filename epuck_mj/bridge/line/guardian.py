@@ -44,7 +44,7 @@ def hire(fileno: Callable[[], int], farewell: bytes) -> subprocess.Popen | None:
     return subprocess.Popen(
         [sys.executable, "-I", "-S", __file__, str(port), farewell.hex()],
         stdin=subprocess.PIPE,
-        # who reads the bridge's output is not kept waiting for the guardian's end
+        # a reader of the bridge's output does not have to wait for the guardian's end
         stdout=subprocess.DEVNULL,
         pass_fds=[port],
         # Ctrl-C on a terminal is for the bridge
@@ -82,7 +82,7 @@ def guard(pipe: int, port: int, farewell: bytes) -> bool:
     if os.read(pipe, len(DISMISSED)) == DISMISSED:
         return False
     for _ in range(N_FAREWELLS):
-        # a robot that cannot be reached now, perhaps can a little later
+        # the robot may be reachable again a little later
         with contextlib.suppress(OSError):
             os.write(port, farewell)
         time.sleep(FAREWELL_PERIOD)
@@ -90,7 +90,7 @@ def guard(pipe: int, port: int, farewell: bytes) -> bool:
 
 
 if __name__ == "__main__":
-    # what ends a bridge must not end its guardian
+    # a signal that ends the bridge must not end its guardian
     for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)

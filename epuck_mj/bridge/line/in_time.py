@@ -16,12 +16,12 @@ T = TypeVar("T")
 def in_time(
     call: Callable[[], T], seconds: float, late: Callable[[T], object] | None = None
 ) -> T:
-    """What a call gives, if it does so in time.
+    """The result of a call, if it ends in time.
 
     Args:
         call: made in a thread of its own.
         seconds: how long it may take.
-        late: called with what comes when nobody waits for it any more.
+        late: called with a result that comes after the time.
 
     Raises:
         TimeoutError: if it takes longer.

@@ -11,7 +11,7 @@ POLL_TIME = 0.01
 WRITE_TIME_MAX = 0.2
 """Time without accepting bytes after which a port is lost [s]. Chosen.
 
-A robot that cannot be told anything for longer can be stopped only on a new port.
+If a port accepts no bytes for longer, the robot can be stopped only on a new port.
 """
 
 READ_MAX = 4096

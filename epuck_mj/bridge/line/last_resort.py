@@ -1,7 +1,7 @@
 """Last resort: a process that goes on stopping a robot after its bridge gave up.
 
 A bridge ends soon, whether or not its robot confirmed that it stopped. The link may
-return when the bridge is gone: then this process stops the robot.
+return when the bridge has ended: then this process stops the robot.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ from epuck_mj.errors import UserError
 
 
 def leave_to_last_resort(port: str) -> None:
-    """Start the process; not on Windows.
+    """Start a process that goes on stopping a robot; not on Windows.
 
     Args:
         port: see `connect`; it is free.
@@ -42,13 +42,13 @@ def stop_at_last(
     clock: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> bool:
-    """Whether a robot confirmed that it stopped, which is tried for a time.
+    """Stop a robot, trying for a time; return whether it confirmed that it stopped.
 
     Args:
         connect: opens the way to it.
         seconds: how long it is tried.
-        clock: what all times are told by.
-        sleep: lets so many seconds go by.
+        clock: returns the time [s].
+        sleep: waits for a number of seconds.
     """
     until = clock() + seconds
     while clock() < until:

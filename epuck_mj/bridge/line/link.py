@@ -1,8 +1,8 @@
 """The link to a robot: requests out, replies in, on a port that may fail at any time.
 
 One request is in flight at a time, and every wait ends at a time that the caller sets.
-A link whose last request was not answered is out of step and asks nothing before it
-went through `protocol.RESYNC`.
+If the last request was not answered, the link is out of step. It then sends no request
+before `protocol.RESYNC` has succeeded.
 """
 
 import time
@@ -27,7 +27,7 @@ class Link:
     """A conversation with a robot on a serial line.
 
     Attributes:
-        clock: what all times are told by [s].
+        clock: returns the time [s].
         in_step: whether the last request was answered, and nothing else came.
     """
 
@@ -41,8 +41,8 @@ class Link:
 
         Args:
             open_port: opens it, and again if it was lost.
-            clock: what all times are told by.
-            sleep: lets so many seconds go by.
+            clock: returns the time [s].
+            sleep: waits for a number of seconds.
 
         Raises:
             UserError: if the port cannot be opened.
@@ -95,11 +95,11 @@ class Link:
             BridgeError: if the reply does not come, or something else does; the link
                 then is out of step.
             RobotRestarted: if the robot was reset.
-            LinkLost: if the port is gone.
+            LinkLost: if the port was lost.
         """
         binary = request.out.endswith(b"\0")
         stale = self._rest + self._port.receive(0.0)
-        # half a banner may be in what is of no use here: `resync` looks at it again
+        # dropped bytes may hold half of a banner: `resync` looks at them again
         self._rest = stale
         if not self.in_step:
             raise BridgeError("host and robot in step", stale or "an open question")
@@ -112,7 +112,7 @@ class Link:
         return self._exchange(request, until)
 
     def order(self, request: Request[T], until: float) -> T:
-        """Send a request in ASCII whatever was heard and however it is; its reply.
+        """Send a request in ASCII in any state of the link; return its reply.
 
         Args:
             request: what to ask.
@@ -159,7 +159,7 @@ class Link:
 
         Raises:
             BridgeError: if no e-puck answers.
-            LinkLost: if the port is gone.
+            LinkLost: if the port was lost.
         """
         restarted, came = False, b""
         while True:
@@ -193,7 +193,7 @@ class Link:
         """Drop bytes until none has come for a while, or until a time; the bytes.
 
         Raises:
-            LinkLost: if the port is gone.
+            LinkLost: if the port was lost.
         """
         came = b""
         heard = self.clock()
@@ -208,7 +208,7 @@ class Link:
         """End any command that the robot waits to complete; ASCII has to follow.
 
         Raises:
-            LinkLost: if the port is gone.
+            LinkLost: if the port was lost.
         """
         self._rest = b""
         self._port.receive(0.0)

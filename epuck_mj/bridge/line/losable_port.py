@@ -1,4 +1,4 @@
-"""Ports that may be lost at any time and opened again, and never keep one waiting."""
+"""Ports that may be lost at any time and opened again, with a limit to every wait."""
 
 import contextlib
 from collections.abc import Callable
@@ -45,8 +45,8 @@ class LosablePort:
             self._port = in_time(self._open_port, seconds, late=_close)
         except TimeoutError:
             raise UserError(
-                f"the port did not open in {seconds:.1f} s and was left. Is the robot "
-                "switched on and near enough?"
+                f"the port did not open within {seconds:.1f} s. Is the robot switched "
+                "on and near enough?"
             ) from None
 
     def send(self, data: bytes) -> None:
@@ -66,7 +66,7 @@ class LosablePort:
             raise
 
     def close(self) -> None:
-        """See Port; what takes too long goes on without us."""
+        """See Port; a close that takes too long goes on in the background."""
         port, self._port = self._port, None
         if port is not None:
             with contextlib.suppress(TimeoutError):

@@ -23,7 +23,7 @@ class SerialLine:
     def greet(self) -> Greeting:
         """See Connection."""
         until = self._link.clock() + CONNECT_TIME_MAX
-        # whatever it did before we came: first it stands still
+        # the robot may still be driving: stop it first
         try:
             self._link.order(ascii.stop_order(), self._link.clock() + STOP_REPLY_TIME)
         except LinkLost:
@@ -50,7 +50,7 @@ class SerialLine:
         Raises:
             BridgeError: if that fails; names what was wrong first.
             RobotRestarted: if the robot was reset.
-            LinkLost: if the port is gone.
+            LinkLost: if the port was lost.
         """
         first: BridgeError | None = None
         while True:
@@ -84,7 +84,7 @@ class SerialLine:
                 if self._link.lost:
                     self._link.reopen(until)
                 elif problem is not None:
-                    # who babbles is not told without a pause
+                    # a robot that sends all the time gets commands with pauses
                     self._link.drain(again)
                 again = min(self._link.clock() + STOP_REPLY_TIME, until)
                 # at once, instead of waiting for silence as a resync does

@@ -36,7 +36,7 @@ class SerialPort:
                 write_timeout=WRITE_TIME_MAX,
                 exclusive=True,
             )
-        # termios has an exception of its own, of no other kind
+        # termios.error is no OSError
         except Exception as error:
             raise UserError(_why(name, error)) from None
         self._guardian = None

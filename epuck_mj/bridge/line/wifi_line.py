@@ -48,8 +48,8 @@ class WifiLine:
 
         Args:
             open_port: connects, and again if the connection was lost.
-            clock: what all times are told by.
-            sleep: lets so many seconds go by.
+            clock: returns the time [s].
+            sleep: waits for a number of seconds.
 
         Raises:
             UserError: if there is no robot.
@@ -73,7 +73,7 @@ class WifiLine:
 
         Raises:
             BridgeError: if what comes is no packet, or nothing comes.
-            LinkLost: if the connection is gone.
+            LinkLost: if the connection was lost.
         """
         if changed:
             self._port.send(wifi_command(left, right))

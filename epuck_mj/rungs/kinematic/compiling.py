@@ -36,7 +36,7 @@ def _folders() -> list[Path]:
     text = b"".join(path.read_bytes() for path in SOURCES)
     name = f"kinematic-{hashlib.sha256(text).hexdigest()[:16]}"
     folders = [Path(__file__).parent / "__pycache__" / name]
-    # not everybody has a home
+    # the home directory may be unknown
     with suppress(RuntimeError):
         folders.append(Path.home() / ".cache" / "epuck-mj" / name)
     return [folder for folder in folders if _is_writable(folder)]

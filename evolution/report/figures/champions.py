@@ -68,14 +68,14 @@ def stored_and_held_out_figure(data: StudyData) -> tuple[Figure, str]:
     legend_below(figure, lines)
     caption = (
         f"Stored and held-out fitness of each champion ({counts(data)}). The black "
-        "bar is what evolution believed of it; the vertical distance from there down "
-        f"to the filled mark, of the {robot_name(data.robots[0])}, is the luck in it. "
+        "bar is the stored fitness. The vertical distance from the bar down to the "
+        f"filled mark, of the {robot_name(data.robots[0])}, is luck. "
         f"{CHAMPION}"
     )
     if any(with_noise(data, name) for name in runs):
         caption += (
-            " Of experiments that evolved with noise the distance is more than luck: "
-            "the dots are of ideal robots."
+            " In experiments that evolved with noise, the distance is more than luck: "
+            "the dots are for ideal robots."
         )
     if reference is not None:
         caption += (
@@ -139,13 +139,13 @@ def rungs_figure(data: StudyData) -> tuple[Figure, str] | None:
         xlabel=f"held-out fitness, {robot_name(first)} (max {data.steps})",
         ylabel=f"held-out fitness, {robot_name(last)} (max {data.steps})",
     )
-    # as many ticks on both
+    # the same number of ticks on both axes
     axes.locator_params(nbins=4)
     legend_below(figure, lines)
     caption = (
         f"Held-out fitness of the champions on the {robot_name(last)} against that on "
-        f"the {robot_name(first)} ({counts(data)}). On the diagonal a champion keeps "
-        "its fitness from one robot to the other."
+        f"the {robot_name(first)} ({counts(data)}). On the diagonal, fitness is the "
+        "same on both robots."
     )
     return figure, caption
 

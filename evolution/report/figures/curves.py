@@ -32,13 +32,11 @@ N_POINTS = 150
 N_MARKERS = 6
 """Markers along a curve, which tell it apart where colour is missing."""
 
-STORED_NOTE = (
-    "Stored fitness is what evolution believes: the mean of the few trials it ran."
-)
+STORED_NOTE = "Stored fitness is the mean of the few trials that evolution ran."
 
 RESTARTS_NOTE = (
-    "The population begins anew now and then, in each run at another time, so the mean "
-    "is not drawn. "
+    "The population is sometimes replaced by a new one, at different times in each "
+    "run, so the mean is not drawn. "
 )
 
 

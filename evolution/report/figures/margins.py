@@ -69,7 +69,7 @@ def margins_figure(margins: Margins, names: Mapping[str, str], most: int) -> Fig
                 amounts, fitness[:, 1], **style
             )[0]
             lower.plot(amounts, crashes, **style)
-            # of many experiments, shades hide one another
+            # with many experiments, shaded areas would hide one another
             if found[0][1].size > 1 and len(experiments) <= FEW:
                 shade = {"color": style["color"], "alpha": 0.12, "lw": 0}
                 upper.fill_between(amounts, fitness[:, 0], fitness[:, 2], **shade)

@@ -77,7 +77,7 @@ def trajectories_figure(data: StudyData) -> tuple[Figure, str]:
     others = [label(data, name) for name in runs if name not in shown]
     if others:
         caption += (
-            " Not drawn, since arena, control step or fitness are others: "
+            " Not drawn, because arena, control step or fitness differ: "
             f"{', '.join(others)}."
         )
     return figure, caption

@@ -1,1 +1,1 @@
-"""The sections of a report, each in a file that is called as its heading."""
+"""The sections of a report, each in a file that is named after its heading."""

@@ -1,4 +1,4 @@
-"""Behaviour: what champions do, and how close to the wall they ride."""
+"""Behaviour: what champions do, and how close to the wall they drive."""
 
 import math
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from evolution.study.data import StudyData
 
 
 def behaviour_section(data: StudyData) -> list[Block]:
-    """What champions do, and how close to the wall they ride."""
+    """What champions do, and how close to the wall they drive."""
     shares = [
         class_means(data, name, robot)
         for robot in shown_robots(data)
@@ -37,19 +37,21 @@ def behaviour_section(data: StudyData) -> list[Block]:
     return [
         Heading("Behaviour"),
         Paragraph(
-            "Share of the test trials in each class, mean over runs; mean clearance "
-            "from shell to wall in mm while a wall is near, median [quartiles] over "
-            f"runs; champions whose mean clearance is below {HUG * 1000:.0f} mm. A "
-            "champion that rides so close is a reality gap in waiting: a real robot's "
-            "sensors and wheels err by more. A trial has the first class that fits:"
+            "The tables show the share of the test trials in each class (mean over "
+            "runs), the mean clearance from shell to wall in mm while a wall is near "
+            "(median [quartiles] over runs), and how many champions have a mean "
+            f"clearance below {HUG * 1000:.0f} mm. A champion that drives so close to "
+            "the wall will probably fail on a real robot, whose sensors and wheels "
+            "have larger errors. A trial belongs to the first class that fits:"
         ),
         Listing([f"{name}: {MEANINGS[name]}" for name in MEANINGS if name in seen]),
         Paragraph(
-            "Whole lap, median over runs: the share of all trials that go all round "
-            "the arena without a crash, near walls in "
-            f"{FOLLOWING_SHARE:.0%} of the time from the first on. Few trials have "
-            "time for one: at top speed the 30 s of the paper's experiments are 3.9 m, "
-            "once round its arena is 3.5 m, and the first wall has to be found."
+            "Whole lap is the share of all trials that go all round the arena without "
+            f"a crash and are near walls for {FOLLOWING_SHARE:.0%} of the time since "
+            "the first wall (median over runs). Few trials are long enough for a lap: "
+            "in the 30 s of the paper's experiments a robot drives 3.9 m at top speed, "
+            "once round the paper's arena is 3.5 m, and the robot has to find the "
+            "first wall before that."
         ),
         *(
             block

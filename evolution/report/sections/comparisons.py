@@ -31,7 +31,7 @@ from evolution.study.data import StudyData
 
 @dataclass(frozen=True, eq=False)
 class Comparison(Contest):
-    """Two experiments held against each other in one measure.
+    """Two experiments compared in one measure.
 
     Attributes:
         a12: probability that a run of the first exceeds one of the second; without
@@ -48,7 +48,7 @@ class Comparison(Contest):
 
     @property
     def equivalent(self) -> bool:
-        """Whether the runs say that the two differ by less than the margin."""
+        """Whether the runs show that the two differ by less than the margin."""
         return self.enough and self.p_equivalence < LEVELS[0]
 
     def turned(self) -> Self:
@@ -162,20 +162,22 @@ def comparisons_section(data: StudyData) -> list[Block]:
     own = found[held_out_measure(first)]
     blocks: list[Block] = [Heading("Comparisons")]
     if not own:
-        return [*blocks, Paragraph("One experiment with runs: nothing to compare.")]
+        return [*blocks, Paragraph("Only one experiment has runs: nothing to compare.")]
     blocks.append(
         Paragraph(
             "Two-sided Mann-Whitney tests over runs. The first "
-            f"{COMPARED_PAIRWISE} experiments are compared pair by pair, each other "
-            "one with the first. Holm's adjustment is within each of these two "
-            "families of a table, for difference and equivalence alike. Equivalent: "
-            "two one-sided Mann-Whitney tests exclude a shift of "
+            f"{COMPARED_PAIRWISE} experiments are compared pair by pair. Each of the "
+            "others is compared with the first. In each table these are two families "
+            "of comparisons. The p values of each family are adjusted by Holm's "
+            "method, for difference and for equivalence. Two experiments are "
+            "equivalent if two one-sided Mann-Whitney tests exclude a shift of "
             f"{own[0].equivalence.margin:g} or more. A12 is the probability that "
             "a run of the first exceeds one of the second (0.5: no effect), with a "
-            "95 % interval; "
-            "the difference of medians has a bootstrap 95 % interval. Below "
-            f"{FEWEST_FOR_INTERVAL} runs there are no intervals, which would not hold "
-            f"their 95 %; below {FEWEST_FOR_STARS} no stars and no verdict."
+            "95 % interval. The difference of medians has a bootstrap 95 % interval. "
+            f"With fewer than {FEWEST_FOR_INTERVAL} runs there are no intervals, "
+            "because they would contain the true value in fewer than 95 % of cases. "
+            f"With fewer than {FEWEST_FOR_STARS} runs there are no stars and no "
+            "verdict."
         )
     )
     blocks += [

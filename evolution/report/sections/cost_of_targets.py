@@ -17,11 +17,11 @@ from evolution.study.data import StudyData
 
 @dataclass(frozen=True, eq=False)
 class TargetCost:
-    """What a target cost an experiment.
+    """Evaluations that an experiment needed for a target.
 
     Attributes:
         experiment: its name.
-        target: fitness to reach: the stored one, since a history has no other.
+        target: stored fitness to reach; a history has no other fitness.
         share: target as a share of the highest fitness there is.
         hits: evaluations until each run reached it, `(runs,)`; nan: never.
         time: expected running time in evaluations, inf if no run reached it.
@@ -76,18 +76,18 @@ def target_rows(data: StudyData) -> list[dict[str, Any]]:
 
 
 def cost_of_targets_section(data: StudyData) -> list[Block]:
-    """What each target cost."""
+    """Blocks about the evaluations that each target cost."""
     costs = target_costs(data)
     goals = dict.fromkeys(cost.target for cost in costs)
     found = {(cost.experiment, cost.target): cost for cost in costs}
     return [
         Heading("Cost of targets"),
         Paragraph(
-            "Expected running time in individual evaluations, if whoever fails starts "
-            "again, and in brackets how many of the runs reached the target (none: not "
-            "within any run's budget). A column per target: a stored fitness, the only "
-            f"one that a history has, of at most {data.steps}. So luck counts here. "
-            "Intervals are in targets.csv."
+            "Expected running time in individual evaluations if a run that misses the "
+            "target is started again; in brackets, how many of the runs reached the "
+            "target (none: no run reached it within its budget). Each column is a "
+            f"target: a stored fitness, of at most {data.steps}. Histories have no "
+            "other fitness, so luck counts here. Intervals are in targets.csv."
         ),
         Table(
             ("experiment", *(f"to {goal:.3g} [evaluations]" for goal in goals)),

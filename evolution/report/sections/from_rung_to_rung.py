@@ -8,7 +8,7 @@ from evolution.study.data import StudyData
 
 
 def from_rung_to_rung_section(data: StudyData) -> list[Block]:
-    """How champions keep their fitness from robot to robot; nothing for one robot."""
+    """Blocks about fitness kept from robot to robot; none if there is one robot."""
     if data.rungs is None:
         return []
     first, last = data.rungs
@@ -31,9 +31,9 @@ def from_rung_to_rung_section(data: StudyData) -> list[Block]:
         Heading("From rung to rung"),
         Paragraph(
             f"Champions tested on the {one} and on the {other} from the same starts. "
-            f"Kept: fitness on the {other} in percent of that on the {one}, by run. "
-            "Rank correlation: Spearman's over runs, given from "
-            f"{FEWEST_FOR_RANKS} runs on."
+            f"Kept: fitness on the {other} in percent of the fitness on the {one}, "
+            "for each run. Rank correlation: Spearman's over runs, if there are at "
+            f"least {FEWEST_FOR_RANKS} runs."
         ),
         Table(
             (

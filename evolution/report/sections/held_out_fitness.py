@@ -48,10 +48,10 @@ def held_out_fitness_section(data: StudyData) -> list[Block]:
         Heading("Held-out fitness"),
         Paragraph(
             f"{SPREAD} of the champion's mean on the test starts, the best run, and "
-            "the median share of its trials that crash. Best stored is last: the "
-            "highest fitness that a run believed in, a mean of few trials that was "
-            "chosen for being high. It is what the paper reports, and seldom the "
-            "champion's."
+            "the median share of its trials that crash. The last column, best stored, "
+            "is the highest fitness that a run stored. It is the mean of a few trials, "
+            "and it was chosen because it is high, so it includes luck. The paper "
+            "reports this number. It is seldom the champion's."
         ),
         Table([*columns, f"best stored {unit}"], rows),
         *_as_evolved(data),
@@ -79,8 +79,9 @@ def _as_evolved(data: StudyData) -> list[Block]:
         columns += [f"{who}: held-out [of {data.steps}]", f"{who}: crashes [%]"]
     return [
         Paragraph(
-            "The same with the disturbances that they evolved with: noise, and where "
-            "the config says so other robots."
+            "The same for experiments that evolved with disturbances, tested with "
+            "these disturbances: noise and, where the config says so, randomised "
+            "robots."
         ),
         Table(columns, rows),
     ]

@@ -26,7 +26,7 @@ def commands(data: StudyData, output: str, ioh: bool) -> dict[str, str]:
             "evolution.verify", study
         ),
         "the hand-written wall follower": command_line("evolution.evaluate", YARDSTICK),
-        "the config of one run (any other likewise)": command_line(
+        "the config of one run (for other runs, change the name)": command_line(
             "evolution.export", run.path.as_posix(), config
         ),
         "that run, byte for byte": command_line(
@@ -67,10 +67,11 @@ def how_to_get_every_number_again_section(
         Listing(
             [
                 "runs.csv: every run; runs-columns.csv: what its columns mean, and "
-                "their units. Tables of this page are made of it, "
-                "pairwise.csv, success.csv and targets.csv; summary.json has all.",
+                "their units. The tables of this page are made from runs.csv, "
+                "pairwise.csv, success.csv and targets.csv. summary.json has all "
+                "numbers.",
                 *(["ioh/: the histories, for IOHanalyzer."] if ioh else []),
-                "Random numbers of intervals are drawn from a fixed seed: the same "
+                "Bootstrap intervals use random numbers from a fixed seed, so the same "
                 "study gives the same bytes.",
             ]
         ),

@@ -35,10 +35,10 @@ def margins_section(data: StudyData) -> list[Block]:
     return [
         Heading("How close to the edge champions drive"),
         Paragraph(
-            "Fitness of the champions on the kinematic robot when one number of the "
-            "robot is changed, then the median share of trials that crash. "
-            "Sources for the radius of the body differ by 1 to 4 mm. All sensors are "
-            "set back together. Commands that are late arrive one control step later."
+            "Fitness of the champions on the kinematic robot with one number of the "
+            "robot changed, then the median share of trials that crash. "
+            "Published radii of the body differ by 1 to 4 mm. All sensors are set "
+            "back together. Late commands arrive one control step later."
         ),
         Table(
             (

@@ -1,4 +1,4 @@
-"""Success: in how many runs each experiment meets a criterion, and who in more."""
+"""Success: in how many runs each experiment meets a criterion, with comparisons."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ MATCHES = "matches the hand-written follower"
 FOLLOWS, KEEPS_OFF = "follows walls", "follows walls without hugging"
 """Criteria of success.
 
-The first asks for the yardstick's mean on the same starts: of one follower, which
-keeps 8 mm off the wall, where closer earns more. The others are the behaviour that the
-paper claims, whatever its fitness. At least `FOLLOWED` of the test trials are a wall
-follower's or a hugger's in the lenient reading, and a wall follower's in the strict
-one.
+The first asks for at least the mean of the hand-written follower on the same starts.
+This follower keeps 8 mm from the wall, and driving closer earns more. The others ask
+for the behaviour that the paper claims, with any fitness. In the lenient reading, at
+least `FOLLOWED` of the test trials are in the class of wall followers or of huggers; in
+the strict reading, in the class of wall followers.
 """
 
 
@@ -49,7 +49,7 @@ class Outcomes:
 
 
 def outcomes(data: StudyData) -> list[Outcomes]:
-    """What of each criterion and robot is known.
+    """Outcomes of each criterion on each robot, as far as they are known.
 
     Without a yardstick there is no `MATCHES`, without behaviour classes no other.
     """
@@ -62,7 +62,7 @@ def outcomes(data: StudyData) -> list[Outcomes]:
             }
             pairs = contests(met, data.alike, _fisher_p)
             found.append(Outcomes(criterion, robot, met, pairs))
-    # all of a criterion together
+    # sorted by criterion
     return sorted(
         found, key=lambda each: (MATCHES, FOLLOWS, KEEPS_OFF).index(each.criterion)
     )
@@ -132,16 +132,17 @@ def success_section(data: StudyData) -> list[Block]:
     blocks: list[Block] = [Heading("Success")]
     meanings = {
         MATCHES: f"held-out mean of at least the {YARDSTICK_LABEL}'s on the same "
-        "starts; it keeps 8 mm off the wall, and closer earns more",
-        FOLLOWS: f"at least {FOLLOWED:.0%} of the test trials are a wall follower's "
-        "or a hugger's, whose mean clearance is below 5 mm",
-        KEEPS_OFF: f"at least {FOLLOWED:.0%} of the test trials are a wall follower's",
+        "starts (it keeps 8 mm from the wall, and driving closer earns more)",
+        FOLLOWS: f"at least {FOLLOWED:.0%} of the test trials are in the class of wall "
+        "followers or of huggers, whose mean clearance is below 5 mm",
+        KEEPS_OFF: f"at least {FOLLOWED:.0%} of the test trials are in the class of "
+        "wall followers",
     }
     for criterion, meaning in meanings.items():
         found = [each for each in everything if each.criterion == criterion]
         if not found:
             absent = (
-                "the hand-written wall follower was not tested in the setting of all"
+                "the hand-written wall follower was not tested in the runs' setting"
                 if criterion == MATCHES
                 else "not every run has behaviour classes"
             )
@@ -158,11 +159,11 @@ def success_section(data: StudyData) -> list[Block]:
             ]
             blocks += [
                 Paragraph(
-                    "Fisher's exact test on each robot, Holm-adjusted: the first "
-                    f"{COMPARED_PAIRWISE} experiments pair by pair, each other one "
-                    "with the first; pairs that differ with p < "
-                    f"{LEVELS[0]}, of {FEWEST_FOR_STARS} runs each at least (all: "
-                    "success.csv):"
+                    "Fisher's exact test on each robot, Holm-adjusted. The first "
+                    f"{COMPARED_PAIRWISE} experiments are compared pair by pair, and "
+                    "each of the others with the first. These pairs, with at least "
+                    f"{FEWEST_FOR_STARS} runs each, differ with p < {LEVELS[0]} "
+                    "(success.csv has all pairs):"
                 ),
                 Listing(decided or ["none"]),
             ]

@@ -1,4 +1,4 @@
-"""What stored fitness promised: the luck in it, which fresh starts do not keep."""
+"""What stored fitness promised: stored against held-out fitness, and the luck."""
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from evolution.report.samples import (
 from evolution.study.data import StudyData
 
 WITH_NOISE = (
-    "Experiments that evolved with noise are held against fresh starts with such "
-    "noise, where their champions were tested so."
+    "Experiments that evolved with noise are compared with fresh starts with the same "
+    "noise, if their champions were tested with it."
 )
 
 
@@ -27,7 +27,7 @@ FITNESSES = (
 
 
 def what_stored_fitness_promised_section(data: StudyData) -> list[Block]:
-    """What stored fitness promised and fresh starts did not keep."""
+    """Blocks that compare stored fitness with fitness on fresh starts."""
     robot = believed_on(data)
     noisy = any(with_noise(data, name) for name in data.with_runs)
     rows = []
@@ -35,7 +35,7 @@ def what_stored_fitness_promised_section(data: StudyData) -> list[Block]:
         stored, held_out = data.stored(name), like_for_like(data, name)
         tested = np.isfinite(held_out)
         believed, worth = most_believed_fitness(data, name)
-        # by run, where every run says both
+        # for each run, if every run has both
         both = held_out[tested].size == worth.size
         rows.append(
             (
@@ -53,11 +53,12 @@ def what_stored_fitness_promised_section(data: StudyData) -> list[Block]:
     return [
         Heading("What stored fitness promised"),
         Paragraph(
-            f"On the {robot_name(robot)}: stored against held-out "
-            "fitness of the champion, then of the individual that the run believed "
-            "most in. The difference is luck: of many noisy evaluations the highest is "
-            "believed. Regained: how much more the champion, chosen on validation "
-            "starts, is worth by run." + (f" {WITH_NOISE}" if noisy else "")
+            f"On the {robot_name(robot)}: stored and held-out fitness of the champion, "
+            "then of the individual with the highest stored fitness of the run (most "
+            "believed). The difference is luck: the highest of many noisy evaluations "
+            "is too high. Regained: how much more held-out fitness the champion, "
+            "chosen on validation starts, has than that individual, for each run."
+            + (f" {WITH_NOISE}" if noisy else "")
         ),
         Table(
             (

@@ -41,8 +41,8 @@ def what_was_run_section(data: StudyData) -> list[Block]:
     blocks: list[Block] = [
         Heading(f"Report of the study {data.path.as_posix()}", 1),
         Paragraph(
-            "Wall following evolved for an e-puck: a replication, with our own "
-            "artefacts and another simulator, of a comparison of a genetic algorithm "
+            "Evolution of wall following for an e-puck: a replication, with our own "
+            "code and another simulator, of a comparison of a genetic algorithm "
             "with two variants of differential evolution."
         ),
         Heading("What is missing"),
@@ -57,8 +57,8 @@ def what_was_run_section(data: StudyData) -> list[Block]:
         few = [label(data, name) for name, each in runs.items() if len(each) < 2]
         blocks.append(
             Paragraph(
-                f"Only one run of {', '.join(few)}: one run has a value but says "
-                "nothing of the spread between runs, so there is no verdict."
+                f"Only one run of {', '.join(few)}: one run does not show the spread "
+                "between runs, so there is no verdict."
             )
         )
     blocks += [
@@ -68,7 +68,7 @@ def what_was_run_section(data: StudyData) -> list[Block]:
             f"{numbered(len(runs), 'experiment')}. "
             f"Evolved on {evolved_on(data)}. "
             f"Each run's champion is tested on {n_starts} test starts, the same for "
-            "all and never seen by evolution, with ideal sensors and motors, on the "
+            "all and never used by evolution, with ideal sensors and motors, on the "
             f"{' and the '.join(map(robot_name, shown_robots(data)))}. The unit is "
             f"the run; fitness is at most {data.steps}, the control steps of a trial."
         ),
@@ -94,15 +94,16 @@ def what_was_run_section(data: StudyData) -> list[Block]:
             texts=3,
         ),
         Paragraph(
-            "Budget and spent are individual evaluations, each of that many trials; a "
-            "run spends whole generations only. Control steps are those of a run"
-            f"{f', in {units}' if unit else ''}, median [quartiles]; "
-            f"{data.steps} a trial at most, fewer for "
-            "robots that crash, and where racing breaks off who can only lose. "
-            "Choosing the champion comes on top, for every algorithm: "
-            f"{_validation_starts(data)} trials of each candidate, which are "
-            f"{_candidates(data)} and the last {LATEST_BEST} that raised the run's "
-            f"best, some of them the same.{_finalists(data)}"
+            "Budget and spent are numbers of individual evaluations; the next column "
+            "says how many trials each has. A run spends whole generations only. "
+            "Control steps are those of a run"
+            f"{f', in {units}' if unit else ''}, median [quartiles]. A trial has at "
+            f"most {data.steps}: fewer if the robot crashes, or if racing stops an "
+            "individual that cannot win any more. The choice of the champion costs "
+            f"extra, for every algorithm: {_validation_starts(data)} trials of each "
+            f"candidate. Candidates are {_candidates(data)} and the last "
+            f"{LATEST_BEST} individuals that raised the run's best; some of them are "
+            f"the same.{_finalists(data)}"
         ),
     ]
     return blocks

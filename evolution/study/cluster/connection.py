@@ -176,8 +176,8 @@ def _answer(future: Any) -> Any:
     error = future.exception(TRANSFER_PATIENCE)
     if isinstance(error, KilledWorker):
         return UserError(
-            f"{error.allowed_failures + 1} workers died while they did it: killed, or "
-            "out of memory? Their logs may tell"
+            f"{error.allowed_failures + 1} workers died during this task: killed, or "
+            "out of memory? See their logs"
         )
     assert isinstance(error, Exception)
     return error.with_traceback(future.traceback(TRANSFER_PATIENCE))
@@ -190,7 +190,7 @@ def connected(address: str) -> Iterator[Cluster]:
     Raises:
         UserError: if no scheduler answers there.
     """
-    # its news are for those who run the cluster; what concerns us is raised
+    # errors that concern the study are raised; other log messages are not shown
     for name in LOGGERS:
         logging.getLogger(name).setLevel(logging.CRITICAL)
     with ExitStack() as stack:
@@ -222,7 +222,7 @@ def _greet(address: str) -> None:
 
     try:
         asyncio.run(greet())
-    # a stranger's answer can be anything
+    # another program may answer anything
     except Exception as error:
         reason = " ".join(str(error).split()) or "no answer"
         raise UserError(
