@@ -41,8 +41,8 @@ def variations_page(
         Heading("Which may have given the paper's numbers?"),
         Paragraph(
             f"The paper reports the best of {REPLICATES} runs of each algorithm. Named "
-            "are the changes with which that number ranks among our runs as the best "
-            f"of {REPLICATES} more may well do (two-sided p of at least 0.05)."
+            "are the changes with which that number lies within our runs and is not "
+            f"too low for the best of {REPLICATES} (two-sided p of at least 0.05)."
         ),
         papers_table(varied),
         Heading("Every variation"),
@@ -95,6 +95,7 @@ def orders_table(found: Sequence[Order]) -> Table:
             )
             for order in back
         ],
+        texts=2,
     )
 
 
@@ -112,8 +113,8 @@ def papers_table(varied: Sequence[Varied]) -> Table:
             f"{in_words(each.change)} (p {each.chance_of_papers:.2g})" for each in told
         ]
         best = f"{PAPER_BEST[algorithm]:g}"
-        rows.append((LABELS[algorithm], best, "; ".join(changes) or "none"))
-    return Table(("algorithm", "paper's best", "changes"), rows)
+        rows.append((LABELS[algorithm], "; ".join(changes) or "none", best))
+    return Table(("algorithm", "changes", "paper's best"), rows, texts=2)
 
 
 def _told(found: Sequence[Order]) -> list[Order]:

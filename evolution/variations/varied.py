@@ -74,8 +74,9 @@ class Varied:
 
     @property
     def may_be_papers(self) -> bool:
-        """Whether the paper's best may come from runs like these."""
-        return self.enough and self.chance_of_papers >= LEVELS[0]
+        """Whether the paper's best is within these runs, and not too low for a best."""
+        within = (self.stored > PAPER_BEST[self.algorithm]).any()
+        return self.enough and bool(within) and self.chance_of_papers >= LEVELS[0]
 
 
 @dataclass(frozen=True)
