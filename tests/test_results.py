@@ -76,7 +76,7 @@ def test_a_study_is_the_shipped_config(path: Path):
     assert StudyConfig.from_yaml(path / "study.yaml").experiments == now.experiments
 
 
-@pytest.mark.parametrize("name", ["hybrids", "good-robot"])
+@pytest.mark.parametrize("name", ["hybrids", "good-robot", "variations", "real-robots"])
 def test_further_studies_are_shipped_configs(name: str):
     study = load_study(RESULTS / name)
     now = StudyConfig.load(find_study(name)).experiments
