@@ -62,7 +62,11 @@ def save_recording(
     probe = ClearanceProbe(scene, 1)
     places = entities([trial.name for trial in trials])
     with rr.RecordingStream(
-        APPLICATION, recording_id=_identity(trials), send_properties=False
+        APPLICATION,
+        recording_id=_identity(trials),
+        send_properties=False,
+        # by default a chunk ends after 0.2 s: on a busy machine files would differ
+        batcher_config=rr.ChunkBatcherConfig.NEVER(),
     ) as stream:
         # rerun only warns when it is switched off
         if not stream.is_enabled():
