@@ -15,12 +15,34 @@ import numpy as np
 import pytest
 
 from epuck_mj.host.interruption import SIGNALS
-from epuck_mj.rungs.table import RUNGS, robots_in
+from epuck_mj.policies.network import Network
+from epuck_mj.rungs.table import RUNGS, compiled_trials, robots_in
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
+from epuck_mj.step.control import TaskParameters
 
 # ignored where tests run in the background of a script, and by all that they start
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile the kinematic robot once, before each process of the tests would.
+
+    Processes that are killed while they compile leave nothing behind.
+    """
+    if not hasattr(config, "workerinput"):
+        scene, task = load_scene(KINEMATIC_ROBOT, "arena"), TaskParameters(steps=1)
+        trials, network = compiled_trials(scene, task, 1), Network()
+        assert trials is not None
+        nothing = network.decode(np.zeros((1, network.n_genes)))
+        trials(nothing, np.zeros((1, 3)), None, 1, np.full(1, -np.inf))
+        _move_once(scene)
+
+
+def _move_once(scene: Scene) -> None:
+    robots = robots_in(scene, 1, 1)
+    robots.reset(np.zeros((1, 3)))
+    robots.step(np.zeros((1, 2)))
 
 
 @pytest.fixture
@@ -60,9 +82,7 @@ def wheels() -> Scene:
 def kinematic() -> Scene:
     """The cheap one, compiled: tests in real time have no time for that."""
     scene = load_scene(KINEMATIC_ROBOT, "arena")
-    robots = robots_in(scene, 1, 1)
-    robots.reset(np.zeros((1, 3)))
-    robots.step(np.zeros((1, 2)))
+    _move_once(scene)
     return scene
 
 

@@ -607,7 +607,7 @@ def test_bad_command_lines_are_one_line(tmp_path, capsys):
     robot.write_text("<mujoco><worldbody/></mujoco>")
     for arguments, message in [
         ((tmp_path,), "no arena"),
-        ((), "required"),
+        ((), "expected ARENA, got none"),
         ((binary,), "cannot read"),
         ((arena, "--robot", "r2d2"), "no robot 'r2d2'"),
         ((arena, "--robot", robot), "robot.xml"),

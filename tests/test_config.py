@@ -265,7 +265,7 @@ def test_networks_that_are_not_the_papers():
     assert config.search_space.genes == 13
     # its genes mean nothing beyond
     assert config.weight_bound == GENE_MAX
-    assert config.conditions == Conditions("calibrated", True)
+    assert config.conditions == Conditions("calibrated", randomise_all=True)
     update = {"network": "feedforward_changes", "hidden": 2, "biases": True}
     changes = config.model_copy(update=update).topology
     assert changes == NetworkWithChanges(2, True)

@@ -16,6 +16,9 @@ BLOCKS = re.findall(r"^```\n(.*?)^```", PAGE, re.M | re.S)
 COMMANDS = [line for block in BLOCKS for line in block.splitlines()]
 BRIDGE = "python -m epuck_mj.bridge"
 
+NO_ANSWER = 3
+"""Exit status of a bridge whose robot did not answer in time."""
+
 
 def quickly(command: str) -> str:
     """The command with few starts on wheels and, but for the first run, few trials."""
@@ -26,6 +29,13 @@ def quickly(command: str) -> str:
     if "evolution.run" in command and "runs/lesson" not in command:
         command += " --evaluations 150 --trials 1 --steps 20"
     return command
+
+
+def drive(command: str) -> tuple[int, str, str]:
+    """Exit status of a command in a process, and what it says."""
+    with python_process("-W", "error", *command.split()[1:]) as process:
+        out, error = process.communicate(timeout=PATIENCE)
+    return process.returncode, out, error
 
 
 @pytest.mark.slow
@@ -54,8 +64,10 @@ def test_the_lesson(alone, monkeypatch, capsys, handlers):
     with fake_process(*arguments) as (_, port):
         for command in drives:
             told = re.sub(r"--port \S+", f"--port {port}", quickly(command))
-            with python_process("-W", "error", *told.split()[1:]) as process:
-                out, error = process.communicate(timeout=PATIENCE)
-            assert (process.returncode, error) == (0, ""), command
+            status, out, error = drive(told)
+            # on a busy machine an emulated robot may answer late
+            if status == NO_ANSWER:
+                status, out, error = drive(told)
+            assert (status, error) == (0, ""), command
             assert "--list-ports" in command or "ended" in out
     assert Path("runs/drive.png").stat().st_size > 1000

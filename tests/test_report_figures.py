@@ -32,6 +32,7 @@ from evolution.report.figures.champions import (
 )
 from evolution.report.figures.curves import (
     N_POINTS,
+    RESTARTS_NOTE,
     common_grid,
     growth_figure,
     growths_figure,
@@ -193,11 +194,11 @@ def test_no_median_of_means_of_populations_that_begin_anew():
     anew = replace(a_study({"cma-es": 0}), runs={"cma-es": runs})
     figure, caption = growth_figure(anew, "cma-es")
     assert "population mean" not in legend_texts(figure)
-    assert "begins anew" in caption
+    assert RESTARTS_NOTE in caption
     # of one run it is no median
     figure, caption = growth_figure(replace(anew, runs={"cma-es": runs[:1]}), "cma-es")
     assert "population mean" in legend_texts(figure)
-    assert "begins anew" not in caption
+    assert RESTARTS_NOTE not in caption
 
 
 def test_no_curve_of_an_experiment_without_runs(data):

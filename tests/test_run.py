@@ -476,7 +476,7 @@ def test_a_copy_without_checkpoint_is_finished_but_cannot_be_mended(
     assert not run.finished
     # it would begin again, and overwrite the histories
     message = refusal("--resume", "run")
-    assert message.startswith("cannot resume 'run': without 'checkpoint.npz' the run ")
+    assert message.startswith("cannot resume 'run': 'checkpoint.npz' is missing")
 
 
 def test_a_run_on_an_own_robot_of_another_name(here, no_pictures, capsys):
