@@ -1,18 +1,12 @@
 """Policies that see how their readings change: one control step of memory."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any, Self
 
 import numpy as np
 
 from epuck_mj.constants import N_PROXIMITY
-from epuck_mj.policies.network import (
-    Controller,
-    Network,
-    controllers_of,
-    genomes_of,
-    n_weights,
-)
+from epuck_mj.policies.network import Controller, OneHiddenLayer
 from epuck_mj.step.control import BatchPolicy
 
 
@@ -64,45 +58,23 @@ class WithChanges:
         return type(self)(self.reflex, self._alike)
 
 
-@dataclass(frozen=True)
-class NetworkWithChanges:
+class NetworkWithChanges(OneHiddenLayer):
     """A network that sees readings and their changes; a topology.
 
-    Attributes:
-        hidden: number of hidden neurons.
-        biases: whether hidden and output neurons have a bias weight.
+    Of the incoming weights of a hidden neuron, those of the eight readings come before
+    those of their changes.
     """
 
-    hidden: int = 4
-    biases: bool = False
-
-    def __post_init__(self) -> None:
-        """Refuse what `Network` refuses.
-
-        Raises:
-            ValueError: if a value is invalid.
-        """
-        Network(self.hidden, self.biases)
-
-    @property
-    def n_genes(self) -> int:
-        """Number of weights: 72 with four hidden neurons without biases."""
-        return n_weights(2 * N_PROXIMITY, self.hidden, self.biases)
+    inputs = 2 * N_PROXIMITY
 
     def to_dict(self) -> dict[str, Any]:
         """The topology as written in controller files."""
         return {"changes": True, **asdict(self)}
 
     def decode(self, genomes: np.ndarray) -> WithChanges:
-        """The controllers of genomes `(..., genes)`, as those of `Network`.
-
-        Of the incoming weights of a hidden neuron, those of the eight readings come
-        before those of their changes.
+        """The controllers of genomes `(..., genes)`; see `controllers`.
 
         Raises:
             ValueError: if the genomes have another length.
         """
-        genomes = genomes_of(genomes, self.n_genes, str(self))
-        inputs = 2 * N_PROXIMITY
-        reflex = controllers_of(genomes, inputs, self.hidden, self.biases)
-        return WithChanges(reflex, alike=genomes.ndim == 1)
+        return WithChanges(self.controllers(genomes), alike=np.ndim(genomes) == 1)

@@ -5,7 +5,7 @@ by the size of the batch, and a controller must act the same alone and in a batc
 """
 
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -37,16 +37,18 @@ def genomes_of(genomes: np.ndarray, n_genes: int, network: str) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Network:
-    """Shape of the network.
+class OneHiddenLayer:
+    """Shape of a network with one hidden layer; a base of topologies.
 
     Attributes:
         hidden: number of hidden neurons.
         biases: whether hidden and output neurons have a bias weight.
+        inputs: number of inputs, of all networks of a class.
     """
 
     hidden: int = 4
     biases: bool = False
+    inputs: ClassVar[int]
 
     def __post_init__(self) -> None:
         """Refuse an invalid number of hidden neurons or invalid biases.
@@ -58,17 +60,14 @@ class Network:
         if type(self.biases) is not bool:
             raise ValueError(f"biases: expected true or false, got {self.biases!r}")
 
-    def to_dict(self) -> dict[str, Any]:
-        """The topology as written in controller files."""
-        return asdict(self)
-
     @property
     def n_genes(self) -> int:
         """Number of weights: 40 for the paper's 8-4-2 without biases."""
-        return n_weights(N_PROXIMITY, self.hidden, self.biases)
+        bias = int(self.biases)
+        return (self.inputs + bias) * self.hidden + (self.hidden + bias) * N_ACTIONS
 
-    def decode(self, genomes: np.ndarray) -> "Controller":
-        """The controllers of genomes `(..., genes)`.
+    def controllers(self, genomes: np.ndarray) -> "Controller":
+        """The controllers of genomes `(..., genes)`, from all inputs to actions.
 
         A genome lists the hidden neurons one after the other, each with its incoming
         weights (and its bias last), then the output neurons likewise.
@@ -77,7 +76,29 @@ class Network:
             ValueError: if the genomes have another length.
         """
         genomes = genomes_of(genomes, self.n_genes, str(self))
-        return controllers_of(genomes, N_PROXIMITY, self.hidden, self.biases)
+        n_in = self.inputs + self.biases
+        batch = genomes.shape[:-1]
+        hidden, output = np.split(genomes, [n_in * self.hidden], axis=-1)
+        hidden = hidden.reshape(*batch, self.hidden, n_in)
+        output = output.reshape(*batch, N_ACTIONS, self.hidden + self.biases)
+        return Controller(
+            np.ascontiguousarray(np.moveaxis(hidden, -1, 0)),
+            np.ascontiguousarray(np.moveaxis(output, -1, 0)),
+        )
+
+
+class Network(OneHiddenLayer):
+    """The paper's network, whose inputs are the eight readings; a topology."""
+
+    inputs = N_PROXIMITY
+
+    def to_dict(self) -> dict[str, Any]:
+        """The topology as written in controller files."""
+        return asdict(self)
+
+    def decode(self, genomes: np.ndarray) -> "Controller":
+        """See `controllers`."""
+        return self.controllers(genomes)
 
 
 @dataclass(frozen=True)
@@ -114,25 +135,6 @@ class Controller:
     def __getitem__(self, index: Any) -> "Controller":
         """The controllers at `index` of the batch, in numpy's sense."""
         return Controller(self.hidden[:, index], self.output[:, index])
-
-
-def n_weights(inputs: int, hidden: int, biases: bool) -> int:
-    """Number of weights of a network with so many inputs and hidden neurons."""
-    return (inputs + biases) * hidden + (hidden + biases) * N_ACTIONS
-
-
-def controllers_of(
-    genomes: np.ndarray, inputs: int, hidden: int, biases: bool
-) -> Controller:
-    """The controllers of genomes `(..., genes)`; see `Network.decode`."""
-    n_in, batch = inputs + biases, genomes.shape[:-1]
-    into, out = np.split(genomes, [n_in * hidden], axis=-1)
-    into = into.reshape(*batch, hidden, n_in)
-    out = out.reshape(*batch, N_ACTIONS, hidden + biases)
-    return Controller(
-        np.ascontiguousarray(np.moveaxis(into, -1, 0)),
-        np.ascontiguousarray(np.moveaxis(out, -1, 0)),
-    )
 
 
 def squashed(sums: np.ndarray) -> np.ndarray:

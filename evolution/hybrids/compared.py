@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from epuck_mj.scene.model_files import WHEELED_ROBOT
+from evolution.report import samples
 from evolution.report.sections.comparisons import MARGIN
 from evolution.search.lifetime_learning import LifetimeLearningParameters
 from evolution.statistics.equivalence import Equivalence, equivalence
@@ -124,8 +125,7 @@ def trials_to_useful(data: StudyData, name: str) -> np.ndarray:
 
 def crash_rates(data: StudyData, name: str) -> np.ndarray:
     """Shares of the champions' test trials on wheels that crash, `(runs,)`."""
-    runs = data.runs[name]
-    return np.array([run.scores.held_out[WHEELED_ROBOT].crash_rate for run in runs])
+    return samples.crash_rates(samples.tests_of(data, name, WHEELED_ROBOT))
 
 
 def median_with_never(values: np.ndarray) -> float:

@@ -9,7 +9,7 @@ from epuck_mj.host.limits import shown
 from evolution.search.table import ALGORITHMS
 
 COMPLETE = "complete"
-"""Type of an error whose message says what came."""
+"""Type of an error whose message says itself what was got."""
 
 
 def one_line(error: ValidationError, keys: Sequence[str], optimizer: type) -> str:

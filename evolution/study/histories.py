@@ -128,19 +128,13 @@ def histories_in(table: pa.Table) -> dict[Run, History]:
     Raises:
         ValueError: if a history is damaged.
     """
-    if not table.num_rows:
-        return {}
     columns = {
         name: table[name].to_numpy() for name in table.column_names if name != ROBOT
     }
     robots = np.asarray(table[ROBOT].to_pylist())
-    changes = (columns["experiment"][1:] != columns["experiment"][:-1]) | (
-        np.diff(columns["seed"]) != 0
-    )
-    bounds = [0, *(np.flatnonzero(changes) + 1).tolist(), table.num_rows]
     found: dict[Run, History] = {}
-    for first, last in pairwise(bounds):
-        part = slice(first, last)
+    for part in slices(table):
+        first = part.start
         history = {
             name: columns[name][part].astype(float) for name in (*HISTORY, *COUNTED)
         }
@@ -153,6 +147,21 @@ def histories_in(table: pa.Table) -> dict[Run, History]:
             raise ValueError(f"the history of {run[0]} seed {run[1]} is invalid")
         found[run] = history
     return found
+
+
+def slices(table: pa.Table) -> list[slice]:
+    """Rows of each run in a sorted table."""
+    if not table.num_rows:
+        return []
+    changes = np.diff(codes(table["experiment"])) != 0
+    changes |= np.diff(table["seed"].to_numpy()) != 0
+    bounds = [0, *(np.flatnonzero(changes) + 1).tolist(), table.num_rows]
+    return [slice(*ends) for ends in pairwise(bounds)]
+
+
+def codes(column: pa.ChunkedArray) -> np.ndarray:
+    """A number for each text of a column, equal for equal ones, `(rows,)`."""
+    return column.combine_chunks().dictionary_encode().indices.to_numpy()
 
 
 def merged(

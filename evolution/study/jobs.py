@@ -205,7 +205,7 @@ class _Worker:
 
 def _work(means: Means, line: Connection) -> None:
     """Main function of a worker: does jobs until its pipe is closed."""
-    # the one that tqdm makes is shared by processes, and left behind when this one ends
+    # tqdm's own lock is a semaphore, which would be left when this process is ended
     tqdm.set_lock(threading.RLock())
     threading.Thread(target=_die_with_parent, daemon=True).start()
     loaded = None

@@ -8,16 +8,14 @@ A run of 3,000 generations would take as much room as fifteen of 200. Of each ru
 - the first two and the last two, and those before and after it climbed.
 
 Control steps are summed over the generations since the row before, as far as they are
-known. What is thinned
-already stays as it is.
+known. A table that is thinned already does not change.
 """
-
-from itertools import pairwise
 
 import numpy as np
 import pyarrow as pa
 
 from evolution.run.history import ROBOT
+from evolution.study.histories import codes, slices
 
 MOST = 60
 """Generations in even steps that stay of a run."""
@@ -35,15 +33,11 @@ def thinned(table: pa.Table) -> pa.Table:
     """
     if not table.num_rows:
         return table
-    names, robots = (_codes(table[name]) for name in ("experiment", ROBOT))
-    seeds, generations = (table[name].to_numpy() for name in ("seed", "generation"))
-    best = table["best"].to_numpy()
+    generations, best = (table[name].to_numpy() for name in ("generation", "best"))
+    robots = codes(table[ROBOT])
     steps = table["control_steps"].to_numpy().astype(float)
-    new = (np.diff(names) != 0) | (np.diff(seeds) != 0)
-    bounds = [0, *(np.flatnonzero(new) + 1).tolist(), table.num_rows]
     stay = np.zeros(table.num_rows, bool)
-    for first, last in pairwise(bounds):
-        run = slice(first, last)
+    for run in slices(table):
         stay[run] = _stay(generations[run], best[run], robots[run])
     index = np.flatnonzero(stay)
     # a row that stays is the last of those that it stands for
@@ -57,11 +51,6 @@ def thinned(table: pa.Table) -> pa.Table:
     return kept.set_column(
         column, kind, pa.array(summed, from_pandas=True).cast(kind.type)
     )
-
-
-def _codes(column: pa.ChunkedArray) -> np.ndarray:
-    """A number for each distinct text, `(rows,)`."""
-    return np.unique(np.asarray(column.to_pylist()), return_inverse=True)[1]
 
 
 def _stay(generations: np.ndarray, best: np.ndarray, robots: np.ndarray) -> np.ndarray:

@@ -40,9 +40,9 @@ def variations_page(
         orders_table(found),
         Heading("Which may have given the paper's numbers?"),
         Paragraph(
-            f"The paper reports the best of {REPLICATES} runs of each algorithm. Named "
-            "are the changes with which that number lies within our runs and is not "
-            f"too low for the best of {REPLICATES} (two-sided p of at least 0.05)."
+            f"The paper reports the best of {REPLICATES} runs of each algorithm. A "
+            "change is listed if the paper's number lies within our runs with it, and "
+            f"may be the best of {REPLICATES} such runs (two-sided p of at least 0.05)."
         ),
         papers_table(varied),
         Heading("Every variation"),

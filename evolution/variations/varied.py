@@ -12,6 +12,7 @@ from evolution.pages.words import (
     PAPERS,
     REPLICATES,
 )
+from evolution.report.samples import crash_rates, tests_of
 from evolution.report.sections.comparisons import MARGIN
 from evolution.statistics.best_of_few import chance_of_best, chance_of_order
 from evolution.statistics.equivalence import Equivalence, equivalence
@@ -120,11 +121,11 @@ def varied_of(studies: Sequence[StudyData]) -> list[Varied]:
             data.steps,
             data.configs[name].fitness,
             data.held_out(name, WHEELED_ROBOT),
-            np.array([run.scores.held_out[WHEELED_ROBOT].crash_rate for run in runs]),
+            crash_rates(tests_of(data, name, WHEELED_ROBOT)),
             data.best_stored(name),
         )
         for data in studies
-        for name, runs in data.with_runs.items()
+        for name in data.with_runs
         for algorithm in [_algorithm(name)]
         if algorithm is not None
     ]
@@ -168,7 +169,7 @@ def _order(
     """The order of algorithms with a change; None if one of them has no runs."""
     if not all(name in everyone for name in PAPERS):
         return None
-    # as the paper reports it: equal beyond that is equal
+    # with the paper's precision: further decimals decide no order
     samples = [np.round(everyone[name].stored, DECIMALS) for name in PAPERS]
     return Order(
         change,
