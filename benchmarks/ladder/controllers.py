@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from epuck_mj.policies.file import CHAMPIONS
 from epuck_mj.policies.network import Network
 from epuck_mj.policies.topology import Topology
 from epuck_mj.policies.wall_follower import WallFollower
@@ -29,7 +28,13 @@ CHAMPION, EARLIER, RANDOM, BY_HAND = "champion", "earlier", "random", "by hand"
 SHARES = (0.05, 0.3)
 """Generations whose best individuals are taken, as shares of a run."""
 
-EARLIER_SEEDS = 2
+STUDIES = ("paper", "wheels", "transfer", "good-robot", "real-robots")
+"""Studies whose champions are taken."""
+
+CHAMPION_SEEDS = 5
+"""Number of runs of each experiment whose champions are taken."""
+
+EARLIER_SEEDS = 1
 """Number of runs of each experiment whose earlier generations are taken."""
 
 N_RANDOM = 15
@@ -88,10 +93,10 @@ def tried(results: Path, evolved: dict[str, list[float]]) -> list[Tried]:
 
 
 def _runs(results: Path) -> Iterator[PackedRun]:
-    """The runs of all studies, by study, experiment and seed."""
-    for table in sorted(results.glob(f"*/{CHAMPIONS}")):
-        for run in runs_at(table.parent, histories=True):
-            if not isinstance(run, RunDirectory):
+    """The first runs of each experiment, by study, experiment and seed."""
+    for study in STUDIES:
+        for run in runs_at(results / study, histories=True):
+            if not isinstance(run, RunDirectory) and run.seed <= CHAMPION_SEEDS:
                 yield run
 
 
@@ -105,7 +110,7 @@ def _of_run(
     if run.seed > EARLIER_SEEDS:
         return
     for share in SHARES:
-        generation = round(share * len(run.history["best"]))
+        generation = round(share * int(run.history["generation"][-1]))
         which = f"{name}, generation {generation}"
         if which not in evolved:
             # no table has it: the run is done again until then

@@ -7,7 +7,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.ladder.controllers import CHAMPION, MADE_HERE, Tried
+from benchmarks.ladder.controllers import CHAMPION, MADE_HERE, STUDIES, Tried
 from epuck_mj.host import files
 from epuck_mj.show import colors
 from epuck_mj.show.colors import fraction
@@ -59,7 +59,14 @@ def write_page(
     picture = path.with_suffix(".png")
     with matplotlib.rc_context(PRINT):
         save_figure(ladder_figure(next(iter(measured.values()))), picture, dpi=200)
-    lines = [HEADER.format(n=len(controllers), starts=starts, picture=picture.name)]
+    lines = [
+        HEADER.format(
+            n=len(controllers),
+            starts=starts,
+            studies=",".join(STUDIES),
+            picture=picture.name,
+        )
+    ]
     for arena, columns in measured.items():
         tried = [each for each in controllers if each.name in columns[REFERENCE]]
         lines += ["", f"## {arena}", "", *_differences(columns, tried)]
@@ -147,9 +154,10 @@ HEADER = """# How far the robots agree
 
 Made by `make ladder`. {n} controllers drive from the same {starts} starts on each robot
 and on the reference: the robot on wheels with a fifth of its physics step, where a
-touch in any physics step is a crash. Controllers are the shipped champions, the best
-individuals of early and middle generations, random genomes, the hand-written wall
-follower, and champions of DE/best that were evolved on the kinematic robot alone. In
+touch in any physics step is a crash. Controllers are the champions of the first five
+runs of each experiment in `results/{{{studies}}}`, the best individuals of early and
+middle generations of the first run, random genomes, the hand-written wall follower, and
+champions of DE/best that were evolved and chosen on the kinematic robot alone. In
 arenas other than the square, every third controller has a quarter of these starts.
 Sensors are ideal. Fitness is of 300.
 
