@@ -1,16 +1,22 @@
 """Outcomes of champions in worlds, and on ideal robots."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
+from typing import Any
 
+import numpy as np
+
+from epuck_mj.rungs.disturbed import disturbed
+from epuck_mj.rungs.simulator import Simulator
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
-from epuck_mj.step.control import Everybody
-from epuck_mj.trials.recorder import record_tracks
-from epuck_mj.trials.tracks import Tracks
+from epuck_mj.step.control import TaskParameters, Trials, run_trials
+from epuck_mj.step.disturbances import Disturbances
+from evolution.gap.side_by_side import SideBySide
 from evolution.gap.worlds import World, met, starts_in
+from evolution.judging.evaluation import CAPACITY, Work
 from evolution.judging.held_out_starts import starts_for_test
 from evolution.named_policies import NamedPolicy
 
@@ -54,17 +60,17 @@ def ideal(
 
     Each drives in `arena`, or in the one that it evolved in if that is None.
     """
-    scenes = cache(lambda arena, step: load_scene(robot, arena, step))
-    free = cache(FreeSpace)
-    outcomes = []
-    for policy in policies:
-        scene = scenes(arena or policy.arena, policy.task.control_step)
-        robots = robots_in(scene, n, threads)
-        starts = starts_for_test(free(scene, policy.start_clearance), n)
-        everybody = Everybody(policy.policy)
-        tracks = record_tracks(robots, everybody, starts, policy.task)
-        outcomes.append(_outcome(tracks, policy.task.control_step))
-    return outcomes
+    found: dict[int, Outcome] = {}
+    groups = _alike(
+        policies,
+        lambda each: (arena or each.arena, each.start_clearance, each.task),
+    )
+    for (place, clearance, task), members in groups.items():
+        scene = load_scene(robot, place, task.control_step)
+        starts = starts_for_test(FreeSpace(scene, clearance), n)
+        robots = robots_in(scene, min(n * len(members), CAPACITY), threads)
+        found |= _outcomes(policies, members, robots, starts, task, None)
+    return [found[i] for i in range(len(policies))]
 
 
 def abroad(
@@ -78,26 +84,74 @@ def abroad(
 
     They all meet the same robot and the same noise; a trial lasts as long as at home.
     """
+    groups = _alike(policies, lambda each: (each.start_clearance, each.task))
+    most = max(map(len, groups.values()))
     for world in worlds:
         scene, period = _scene(world, robot)
-        robots = robots_in(scene, n, threads)
-        # slow, and the same for most policies
-        free = cache(FreeSpace)
-        outcomes = []
-        for policy in policies:
-            duration = policy.task.steps * policy.task.control_step
-            steps = max(1, round(duration / period))
-            task = replace(policy.task, steps=steps, control_step=period)
-            starts = starts_in(world, free(scene, policy.start_clearance), n)
-            tracks = record_tracks(
-                robots,
-                Everybody(policy.policy),
-                starts,
-                task,
+        robots = robots_in(scene, min(n * most, CAPACITY), threads)
+        free = cache(partial(FreeSpace, scene))
+        found: dict[int, Outcome] = {}
+        for (clearance, own), members in groups.items():
+            steps = max(1, round(own.steps * own.control_step / period))
+            task = replace(own, steps=steps, control_step=period)
+            starts, robot_met = (
+                starts_in(world, free(clearance), n),
                 met(world, n, steps),
             )
-            outcomes.append(_outcome(tracks, period))
-        yield outcomes
+            found |= _outcomes(policies, members, robots, starts, task, robot_met)
+        yield [found[i] for i in range(len(policies))]
+
+
+def _alike(
+    policies: Sequence[NamedPolicy], common: Callable[[NamedPolicy], Any]
+) -> dict[Any, list[int]]:
+    """Numbers of policies by what they have in common."""
+    found: dict[Any, list[int]] = {}
+    for i, policy in enumerate(policies):
+        found.setdefault(common(policy), []).append(i)
+    return found
+
+
+def _outcomes(
+    policies: Sequence[NamedPolicy],
+    members: Sequence[int],
+    robots: Simulator,
+    starts: np.ndarray,
+    task: TaskParameters,
+    disturbances: Disturbances | None,
+) -> dict[int, Outcome]:
+    """Outcomes of some policies by number, all from the same starts `(n, 3)`."""
+    n, many = len(starts), len(members)
+    same = np.tile(np.arange(n), many)
+    work = Work(
+        SideBySide.of([policies[i].policy for i in members], n),
+        starts[same],
+        disturbances=None if disturbances is None else disturbances[same],
+    )
+    trials = Trials.joined(
+        [
+            run_trials(
+                disturbed(robots, part.disturbances, task.control_step),
+                part.controller,
+                part.starts,
+                task,
+            )
+            for part in work.chunks(robots.capacity)
+        ]
+    )
+    fitness, steps, crashed = (
+        each.reshape(many, n) for each in (trials.fitness, trials.steps, trials.crashed)
+    )
+    lived = steps.sum(axis=-1) * task.control_step
+    return {
+        number: Outcome(
+            # after a crash, the rest of the time earns nothing
+            fitness=float(fitness[i].mean() / task.steps),
+            collisions_per_minute=float(60 * crashed[i].sum() / lived[i]),
+            crash_rate=float(crashed[i].mean()),
+        )
+        for i, number in enumerate(members)
+    }
 
 
 def _scene(world: World, robot: str) -> tuple[Scene, float]:
@@ -105,14 +159,3 @@ def _scene(world: World, robot: str) -> tuple[Scene, float]:
     step = load_scene(robot, world.arena).model.opt.timestep
     period = round(max(1, round(world.period / step)) * step, 9)
     return load_scene(robot, world.arena, period), period
-
-
-def _outcome(tracks: Tracks, period: float) -> Outcome:
-    lived = tracks.steps.sum() * period
-    duration = tracks.fitness.shape[1] * period
-    return Outcome(
-        # after a crash, the rest of the time earns nothing
-        fitness=float(tracks.trial_fitness.mean() * period / duration),
-        collisions_per_minute=float(60 * tracks.crashed.sum() / lived),
-        crash_rate=float(tracks.crashed.mean()),
-    )
