@@ -7,7 +7,13 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.ladder.controllers import CHAMPION, MADE_HERE, STUDIES, Tried
+from benchmarks.ladder.controllers import (
+    CHAMPION,
+    CHAMPION_SEEDS,
+    MADE_HERE,
+    STUDIES,
+    Tried,
+)
 from epuck_mj.host import files
 from epuck_mj.show import colors
 from epuck_mj.show.colors import fraction
@@ -63,6 +69,7 @@ def write_page(
         HEADER.format(
             n=len(controllers),
             starts=starts,
+            seeds=CHAMPION_SEEDS,
             studies=",".join(STUDIES),
             picture=picture.name,
         )
@@ -154,11 +161,11 @@ HEADER = """# How far the robots agree
 
 Made by `make ladder`. {n} controllers drive from the same {starts} starts on each robot
 and on the reference: the robot on wheels with a fifth of its physics step, where a
-touch in any physics step is a crash. Controllers are the champions of the first five
+touch in any physics step is a crash. Controllers are the champions of the first {seeds}
 runs of each experiment in `results/{{{studies}}}`, the best individuals of early and
-middle generations of the first run, random genomes, the hand-written wall follower, and
-champions of DE/best that were evolved and chosen on the kinematic robot alone. In
-arenas other than the square, every third controller has a quarter of these starts.
+middle generations of the first run on the kinematic robot, random genomes, the
+hand-written wall follower, and champions of DE/best that were evolved and chosen on the
+kinematic robot alone. In arenas other than the square, every third controller has a quarter of these starts.
 Sensors are ideal. Fitness is of 300.
 
 Differences are those of a controller's mean fitness on the robot from that on the
