@@ -165,8 +165,8 @@ touch in any physics step is a crash. Controllers are the champions of the first
 runs of each experiment in `results/{{{studies}}}`, the best individuals of early and
 middle generations of the first run on the kinematic robot, random genomes, the
 hand-written wall follower, and champions of DE/best that were evolved and chosen on the
-kinematic robot alone. In arenas other than the square, every third controller has a quarter of these starts.
-Sensors are ideal. Fitness is of 300.
+kinematic robot alone. In arenas other than the square, every third controller has a
+quarter of these starts. Sensors are ideal. Fitness is of 300.
 
 Differences are those of a controller's mean fitness on the robot from that on the
 reference: their mean size, their mean (bias), and the largest. Those below 3 do not
