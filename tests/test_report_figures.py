@@ -405,6 +405,9 @@ def test_an_experiment_is_called_as_its_user_calls_it(data):
     # who spends less is not
     short = data.configs["ga"].model_copy(update={"evaluations": 150})
     assert experiment_label("ga", short) == "GA"
+    # unless the name says so
+    assert experiment_label("ga-150", short) == "GA, 150 evaluations"
+    assert experiment_label("ga-200", short) == "ga-200"
     assert robot_name("/a/my_robot.xml") == "my_robot"
 
 

@@ -69,6 +69,10 @@ def experiment_label(experiment: str, config: ExperimentConfig | None) -> str:
         experiment: its name.
         config: what it is; a user's own may have the name of a shipped one.
     """
+    # a name may end with the number of evaluations
+    name, _, end = experiment.rpartition("-")
+    if config is not None and name in LABELS and end == str(config.evaluations):
+        return f"{experiment_label(name, config)}, {config.evaluations:,} evaluations"
     if config is None or experiment not in LABELS:
         return experiment
     own = config.optimizer != _shipped_optimizer(experiment)
