@@ -21,10 +21,10 @@ from epuck_mj.step.disturbances import ALL_RANGES
 from epuck_mj.step.motors import Speeds
 from evolution.gap import worlds as gap_worlds
 from evolution.gap.__main__ import measure_gap
-from evolution.gap.figure import abroad_figure
+from evolution.gap.figure import gap_figure
 from evolution.gap.gap_document import gap_document
 from evolution.gap.groups import experiments, labels, peers
-from evolution.gap.outcomes import Outcome, abroad, ideal
+from evolution.gap.outcomes import Outcome, ideal, in_worlds
 from evolution.gap.slowed import with_slowed
 from evolution.gap.transfer import (
     Gap,
@@ -47,7 +47,7 @@ from evolution.pages.blocks import to_markdown
 from tests import shipped
 
 CHAMPION = shipped.champion_file()
-HOME = World(
+NOMINAL = World(
     kind="usual",
     number=0,
     arena="arena",
@@ -120,9 +120,9 @@ def test_starts_differ_from_world_to_world(monkeypatch):
         "evolution.gap.outcomes.starts_in",
         lambda *given: seen.append(starts(*given)) or seen[-1],
     )
-    places = [HOME, replace(HOME, number=1), replace(HOME, kind="beyond")]
+    places = [NOMINAL, replace(NOMINAL, number=1), replace(NOMINAL, kind="beyond")]
     for _ in range(2):
-        list(abroad([FOLLOWER], places, "epuck_kinematic", 3, 1))
+        list(in_worlds([FOLLOWER], places, "epuck_kinematic", 3, 1))
     for i in range(3):
         np.testing.assert_array_equal(seen[i], seen[i + 3])
         assert (seen[i] != seen[i - 1]).any()
@@ -153,18 +153,18 @@ def test_a_world_has_one_robot_and_new_noise_in_each_trial():
 
 
 @pytest.mark.parametrize("robot", RUNGS)
-def test_a_world_like_home_keeps_everything(robot):
-    (home,) = ideal([FOLLOWER], robot, 20, 1)
-    ((same,),) = abroad([FOLLOWER], [HOME], robot, 20, 1)
+def test_a_nominal_world_keeps_everything(robot):
+    (nominal,) = ideal([FOLLOWER], robot, 20, 1)
+    ((same,),) = in_worlds([FOLLOWER], [NOMINAL], robot, 20, 1)
     # counts and whole steps are all that is left
-    assert abs(same.fitness / home.fitness - 1) < 0.05
+    assert abs(same.fitness / nominal.fitness - 1) < 0.05
     assert same.collisions_per_minute < 1
-    worse = replace(HOME, latency=3, curve=0.7)
-    ((hurt,),) = abroad([FOLLOWER], [worse], robot, 20, 1)
-    assert hurt.fitness < 0.5 * home.fitness
+    worse = replace(NOMINAL, latency=3, curve=0.7)
+    ((hurt,),) = in_worlds([FOLLOWER], [worse], robot, 20, 1)
+    assert hurt.fitness < 0.5 * nominal.fitness
     # so wide that its sensors see from farther in: no more room beside a wall
-    thick = replace(HOME, body_radius=0.037, set_back=0.002)
-    ((wide,),) = abroad([FOLLOWER], [thick], robot, 20, 1)
+    thick = replace(NOMINAL, body_radius=0.037, set_back=0.002)
+    ((wide,),) = in_worlds([FOLLOWER], [thick], robot, 20, 1)
     assert wide.fitness != same.fitness
 
 
@@ -180,36 +180,36 @@ def test_a_slowed_policy_is_itself_at_another_speed():
     assert slow.turn / own.turn == pytest.approx(slow.forward / own.forward)
     assert all(each.policy is FOLLOWER.policy for each in at_speeds)
     assert with_slowed([FOLLOWER], ()) == [FOLLOWER]
-    late = replace(HOME, latency=2)
-    ((fast, slower, _),) = abroad(at_speeds, [late], "epuck_kinematic", 20, 1)
+    late = replace(NOMINAL, latency=2)
+    ((fast, slower, _),) = in_worlds(at_speeds, [late], "epuck_kinematic", 20, 1)
     assert slower.crash_rate < fast.crash_rate
 
 
 def test_ideal_robots_in_another_arena():
-    (home,) = ideal([FOLLOWER], "epuck_kinematic", 20, 1)
+    (nominal,) = ideal([FOLLOWER], "epuck_kinematic", 20, 1)
     (same,) = ideal([FOLLOWER], "epuck_kinematic", 20, 1, "arena")
     (small,) = ideal([FOLLOWER], "epuck_kinematic", 20, 1, "small_square")
-    assert same == home
+    assert same == nominal
     # no wall is far away
-    assert small.fitness > 1.1 * home.fitness
+    assert small.fitness > 1.1 * nominal.fitness
 
 
 def test_threads_and_company_change_nothing():
     other = named_policies(str(CHAMPION))
     places = worlds(3)[:2]
-    alone = list(abroad([FOLLOWER], places, "epuck_kinematic", 4, 1))
-    both = list(abroad([*other, FOLLOWER], places, "epuck_kinematic", 4, 2))
+    alone = list(in_worlds([FOLLOWER], places, "epuck_kinematic", 4, 1))
+    both = list(in_worlds([*other, FOLLOWER], places, "epuck_kinematic", 4, 2))
     assert [outcomes[-1] for outcomes in both] == [outcomes[0] for outcomes in alone]
 
 
 def test_a_trial_lasts_as_long_in_every_world():
     """Faster control steps are more of them; a mean step is worth the same."""
     for period in (0.075, 0.125):
-        ((found,),) = abroad(
-            [FOLLOWER], [replace(HOME, period=period)], "epuck_kinematic", 20, 1
+        ((found,),) = in_worlds(
+            [FOLLOWER], [replace(NOMINAL, period=period)], "epuck_kinematic", 20, 1
         )
-        (home,) = ideal([FOLLOWER], "epuck_kinematic", 20, 1)
-        assert abs(found.fitness / home.fitness - 1) < 0.2
+        (nominal,) = ideal([FOLLOWER], "epuck_kinematic", 20, 1)
+        assert abs(found.fitness / nominal.fitness - 1) < 0.2
 
 
 def outcomes(fitness, collisions):
@@ -219,7 +219,7 @@ def outcomes(fitness, collisions):
 
 TRANSFER = Transfer.of(
     outcomes([0.5, 0.4, 0.1], [0, 0, 0]),
-    # in the second world's arena, the second policy would be better than at home
+    # in the second world's arena, the second policy would be better
     [outcomes([0.5, 0.6 if world == 1 else 0.3, 0.1], [0] * 3) for world in range(4)],
     [
         outcomes([0.5, 0.4, 0.1], [0.0, 0.5, 2.0]),
@@ -245,14 +245,14 @@ def test_shares_and_mastered_worlds():
             [False, False, True],
         ],
     )
-    against_home = TRANSFER.mastered_against_home
+    against_nominal = TRANSFER.mastered_against_nominal
     # a collision a minute is too many, whatever it is measured against
-    assert against_home[:, 1].tolist() == [True, False, False, False]
+    assert against_nominal[:, 1].tolist() == [True, False, False, False]
     kinder = replace(TRANSFER, reference=2 * TRANSFER.reference)
     assert not kinder.mastered[:, 0].any()
-    np.testing.assert_array_equal(kinder.mastered_against_home, against_home)
+    np.testing.assert_array_equal(kinder.mastered_against_nominal, against_nominal)
     found = verdict(TRANSFER, 0)
-    assert found.home == 0.5
+    assert found.nominal == 0.5
     np.testing.assert_allclose(found.share.value, np.mean([1, 0.82, 0.4, 0.6]))
     np.testing.assert_allclose(found.median_share, 0.71)
     assert found.mastered.value == 0.5
@@ -264,30 +264,30 @@ def test_shares_and_mastered_worlds():
 
 
 def test_rank_correlations_of_hand_made_worlds():
-    home = np.array([5.0, 4.0, 3.0, 2.0, 1.0])
-    worlds = np.array([home * 2, home**2, [1, 2, 3, 5, 4], np.ones(5)])
+    nominal = np.array([5.0, 4.0, 3.0, 2.0, 1.0])
+    worlds = np.array([nominal * 2, nominal**2, [1, 2, 3, 5, 4], np.ones(5)])
     # a sixth is slower, and best everywhere
-    all_home = np.append(home, 0.0)
-    abroad = np.column_stack([worlds, np.full(4, 99.0)])
-    transfer = Transfer(all_home, *[abroad] * 4)
+    all_nominal = np.append(nominal, 0.0)
+    in_worlds = np.column_stack([worlds, np.full(4, 99.0)])
+    transfer = Transfer(all_nominal, *[in_worlds] * 4)
     fast = range(5)
     found = rank_correlations(transfer, fast)
     assert found is not None
-    # as home, as home, another order; the fourth says nothing
-    third = np.corrcoef(home, [1, 2, 3, 5, 4])[0, 1]
-    np.testing.assert_allclose(found["home"], (1 + 1 + third) / 3)
+    # as nominal, as nominal, another order; the fourth says nothing
+    third = np.corrcoef(nominal, [1, 2, 3, 5, 4])[0, 1]
+    np.testing.assert_allclose(found["nominal"], (1 + 1 + third) / 3)
     np.testing.assert_allclose(found["worlds"], (1 + third + third) / 3)
     assert between_robots(transfer, transfer, fast) == pytest.approx(1)
     mixed = rank_correlations(transfer, range(6))
     assert mixed is not None
-    assert mixed["home"] < found["home"]
+    assert mixed["nominal"] < found["nominal"]
     for few in (range(4), [5]):
         assert rank_correlations(transfer, few) is None
         assert between_robots(transfer, transfer, few) is None
     # none at all is a correlation, too
     unrelated = np.array([[2.0, 5.0, 3.0, 1.0, 4.0]] * 2)
-    found = rank_correlations(Transfer(home, *[unrelated] * 4), fast)
-    assert found == pytest.approx({"home": 0.0, "worlds": 1.0})
+    found = rank_correlations(Transfer(nominal, *[unrelated] * 4), fast)
+    assert found == pytest.approx({"nominal": 0.0, "worlds": 1.0})
     alike = Transfer(np.ones(5), *[np.ones((3, 5))] * 4)
     assert rank_correlations(alike, fast) is between_robots(alike, alike, fast) is None
 
@@ -340,7 +340,7 @@ def test_the_document_says_who_kept_what():
     gap = Gap("usual", names, transfers, groups, peers_of, 5, LATENCY)
     text = to_markdown(gap_document([gap, replace(gap, kind="corners")]))
     assert "3 policies, unchanged, in 4 worlds" in text
-    titles = "| n | usual worlds | outer corners and posts | at home | kept |"
+    titles = "| n | usual worlds | outer corners and posts | nominal | kept |"
     assert titles in text
     # fitness 0.3525 and 0.35, crashes in none and in 9.4 % of the trials
     there = "0.351, 4.7%"
@@ -362,7 +362,10 @@ def test_the_document_says_who_kept_what():
             [Gap("usual", [*"abcde"], both, groups, {"0.1 m/s": range(5)}, 5, LATENCY)]
         )
     )
-    assert "- 5 policies of 0.1 m/s, epuck: between home and a world, " in ranked
+    assert (
+        "- 5 policies of 0.1 m/s, epuck: between nominal fitness and a world, "
+        in ranked
+    )
     assert "by mean fitness over the worlds, 1.00" in ranked
     # late in the second and the third world: fitness 0.305 and 0.35, crashes 0, 12.5 %
     assert "| experiment | robot | n | 0 | 2 |" in text
@@ -381,7 +384,7 @@ def test_the_figure_names_experiments_as_reports_do():
         Gap(kind, names, {"epuck": transfer}, groups, {"fast": members}, 5, LATENCY)
         for kind in KINDS
     ]
-    figure = abroad_figure(gaps, labels(policies, groups))
+    figure = gap_figure(gaps, labels(policies, groups))
     (legend,) = figure.legends
     assert isinstance(legend, Legend)
     titles = [text.get_text() for text in legend.get_texts()]
@@ -420,11 +423,11 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
     for row in rows:
         kind, world = row["kind"], int(row["number"])
         policy = kinds[kind][row["policy"]]
-        there = policy["abroad"][world]["fitness"]
-        share = there / max(policy["home"], policy["ideal"][world])
+        there = policy["in_worlds"][world]["fitness"]
+        share = there / max(policy["nominal"], policy["ideal"][world])
         assert float(row["share"]) == pytest.approx(share, abs=1e-4)
         assert float(row["fitness"]) == pytest.approx(there, abs=1e-4)
-        crashes = policy["abroad"][world]["crash_rate"]
+        crashes = policy["in_worlds"][world]["crash_rate"]
         assert float(row["crash_rate"]) == pytest.approx(crashes, abs=1e-4)
         assert row["arena"] == record["worlds"][kind][world]["arena"]
     assert imread(output / "gap.png").shape[1] > 1000
@@ -461,8 +464,8 @@ def test_bad_input_is_one_line(arguments, words, tmp_path):
 
 def test_every_arena_of_the_worlds_is_shipped():
     for arena in (*gap_worlds.ARENAS, *gap_worlds.CORNERS):
-        ((found,),) = abroad(
-            [FOLLOWER], [replace(HOME, arena=arena)], "epuck_kinematic", 2, 1
+        ((found,),) = in_worlds(
+            [FOLLOWER], [replace(NOMINAL, arena=arena)], "epuck_kinematic", 2, 1
         )
         assert 0 <= found.fitness <= 1
 

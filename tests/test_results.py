@@ -157,13 +157,13 @@ def test_the_gap_s_documents_say_what_was_measured(monkeypatch):
         transfers = {}
         for robot, kinds in record["robots"].items():
             each = kinds[kind].values()
-            home = np.array([policy["home"] for policy in each])
+            nominal = np.array([policy["nominal"] for policy in each])
             ideal = np.array([policy["ideal"] for policy in each]).T
-            abroad = [
-                np.array([[world[what] for world in p["abroad"]] for p in each]).T
+            there = [
+                np.array([[world[what] for world in p["in_worlds"]] for p in each]).T
                 for what in ("fitness", "collisions_per_minute", "crash_rate")
             ]
-            transfers[robot] = Transfer(home, np.maximum(home, ideal), *abroad)
+            transfers[robot] = Transfer(nominal, np.maximum(nominal, ideal), *there)
         gap = Gap(
             kind,
             names,

@@ -58,16 +58,16 @@ def measure_gap(argv: Sequence[str]) -> int:
     robots = [options.robot] if options.robot else [KINEMATIC_ROBOT, WHEELED_ROBOT]
     # slow to import
     from evolution.gap.gap_folder import write_gap
-    from evolution.gap.outcomes import check_homes
+    from evolution.gap.outcomes import check_nominal
 
     try:
-        check_homes(policies, robots)
+        check_nominal(policies, robots)
     except UserError as problem:
         if options.robot:
             raise
         # on wheels only, if all arenas allow that
         robots = [WHEELED_ROBOT]
-        check_homes(policies, robots)
+        check_nominal(policies, robots)
         print(f"not driven on {KINEMATIC_ROBOT}: {problem}", file=sys.stderr)
     with writing():
         options.output.mkdir(parents=True, exist_ok=True)

@@ -22,7 +22,7 @@ APART = 0.22
 """Distance of two kinds in the row of an experiment, in rows."""
 
 
-def abroad_figure(gaps: Sequence[Gap], names: Mapping[str, str]) -> Figure:
+def gap_figure(gaps: Sequence[Gap], names: Mapping[str, str]) -> Figure:
     """Figure with a row per experiment, and two panels per robot: fitness, crashes.
 
     Args:

@@ -1,4 +1,4 @@
-"""Document about the gap: fitness and crashes abroad, what is kept, and ranks."""
+"""Document about the gap: fitness and crashes in worlds, what is kept, and ranks."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -19,12 +19,12 @@ from evolution.gap.worlds import KINDS
 from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
 
 COLUMNS = (
-    *("experiment", "policy", "fitness", "trials that crash", "fitness at home"),
+    *("experiment", "policy", "fitness", "trials that crash", "nominal fitness"),
     *("kept, mean", "kept, median", "collisions per minute", "worlds mastered"),
 )
 KEPT_COLUMNS = (
-    *("experiment", "robot", "n", "fitness at home", "kept"),
-    *("collisions per minute", "worlds mastered", "against home"),
+    *("experiment", "robot", "n", "nominal fitness", "kept"),
+    *("collisions per minute", "worlds mastered", "against nominal"),
 )
 
 
@@ -42,13 +42,15 @@ def gap_summary(gaps: Sequence[Gap]) -> Table:
         speeds = [s for s, each in first.peers.items() if set(each) & set(members)]
         for robot, transfer in first.transfers.items():
             there = [_there(gap.transfers[robot], members) for gap in gaps]
-            own = transfer.home[members], transfer.share[:, members].mean(axis=0)
-            home, kept = (float(np.median(each)) for each in own)
+            own = transfer.nominal[members], transfer.share[:, members].mean(axis=0)
+            nominal, kept = (float(np.median(each)) for each in own)
             n = str(len(members))
             speed = ", ".join(speeds)
-            rows.append([group, speed, robot, n, *there, f"{home:.3f}", f"{kept:.0%}"])
+            rows.append(
+                [group, speed, robot, n, *there, f"{nominal:.3f}", f"{kept:.0%}"]
+            )
     titles = (KINDS[gap.kind].title for gap in gaps)
-    columns = ("experiment", "full speed", "robot", "n", *titles, "at home", "kept")
+    columns = ("experiment", "full speed", "robot", "n", *titles, "nominal", "kept")
     return Table(columns, rows, texts=3)
 
 
@@ -66,18 +68,18 @@ def kept_table(gap: Gap) -> Table:
     rows = []
     for group, members in gap.groups.items():
         for robot, transfer in gap.transfers.items():
-            share, collisions, mastered, against_home = (
+            share, collisions, mastered, against_nominal = (
                 float(np.median(values[:, members].mean(axis=0)))
                 for values in (
                     transfer.share,
                     transfer.collisions,
                     transfer.mastered,
-                    transfer.mastered_against_home,
+                    transfer.mastered_against_nominal,
                 )
             )
-            home = float(np.median(transfer.home[members]))
-            cells = [group, robot, str(len(members)), f"{home:.3f}", f"{share:.0%}"]
-            shares = [f"{mastered:.0%}", f"{against_home:.0%}"]
+            nominal = float(np.median(transfer.nominal[members]))
+            cells = [group, robot, str(len(members)), f"{nominal:.3f}", f"{share:.0%}"]
+            shares = [f"{mastered:.0%}", f"{against_nominal:.0%}"]
             rows.append([*cells, f"{collisions:.1f}", *shares])
     return Table(KEPT_COLUMNS, rows, texts=2)
 
@@ -102,10 +104,10 @@ def gap_document(gaps: Sequence[Gap]) -> list[Block]:
             f"{len(first.names)} policies, unchanged, in {first.latency.size} worlds "
             f"of each kind, drawn as a Latin hypercube, on {first.starts} starts, "
             "which differ from world to world. In each column: mean step fitness, and "
-            "the share of the trials that end in a crash. Home is the arena that a "
-            "policy evolved in, with ideal sensors and motors and as many test starts. "
-            "Kept is the fitness in the first kind of worlds as a share of the fitness "
-            "at home."
+            "the share of the trials that end in a crash. The nominal fitness is "
+            "that with ideal sensors and motors, in the arena that a policy evolved "
+            "in, from as many test starts. Kept is the fitness in the first kind of "
+            "worlds as a share of the nominal fitness."
         ),
         gap_summary(gaps),
         Paragraph(
@@ -128,12 +130,12 @@ def gap_document(gaps: Sequence[Gap]) -> list[Block]:
         Heading("What is kept"),
         Paragraph(
             "In the usual worlds. Kept is the fitness in the world as a share of a "
-            "reference: the fitness at home, or the fitness of an ideal robot in that "
+            "reference: the nominal fitness, or the fitness of an ideal robot in the "
             "world's arena if that is higher (in a smaller arena, robots find walls "
             "sooner). A slow policy has little to lose. A policy masters a world if it "
             f"keeps at least {SHARE_KEPT:.0%} and has fewer than {COLLISIONS_MAX:g} "
-            "collision per minute. Against home: worlds mastered if the reference is "
-            "always the fitness at home."
+            "collision per minute. Against nominal: worlds mastered if the reference "
+            "is always the nominal fitness."
         ),
         kept_table(first),
         Paragraph(
@@ -161,9 +163,10 @@ def _ranks(gap: Gap) -> list[Block]:
             found = rank_correlations(transfer, members)
             if found is not None:
                 items.append(
-                    f"{len(members)} policies of {speed}, {robot}: between home and a "
-                    f"world, mean over the worlds, {found['home']:.2f}; between two "
-                    f"worlds, mean over all pairs, {found['worlds']:.2f}"
+                    f"{len(members)} policies of {speed}, {robot}: between nominal "
+                    "fitness and a world, mean over the worlds, "
+                    f"{found['nominal']:.2f}; between two worlds, mean over all pairs, "
+                    f"{found['worlds']:.2f}"
                 )
         if len(gap.transfers) == 2:
             one, other = gap.transfers.values()
@@ -179,8 +182,8 @@ def _ranks(gap: Gap) -> list[Block]:
         Heading("Ranks"),
         Paragraph(
             "Rank correlations (Spearman) of fitness, among policies with the same "
-            "full speed only: slower policies earn less at home and keep more of it "
-            "in every world."
+            "full speed only: slower policies have less nominal fitness and "
+            "keep more of it in every world."
         ),
         Listing(items),
     ]
@@ -192,7 +195,7 @@ def _cells(found: Verdict) -> list[str]:
     return [
         f"{fitness.value:.3f} [{fitness.low:.3f}, {fitness.high:.3f}]",
         f"{crashes.value:.1%} [{crashes.low:.1%}, {crashes.high:.1%}]",
-        f"{found.home:.3f}",
+        f"{found.nominal:.3f}",
         f"{share.value:.2f} [{share.low:.2f}, {share.high:.2f}]",
         f"{found.median_share:.2f}",
         f"{collisions.value:.1f} [{collisions.low:.1f}, {collisions.high:.1f}]",

@@ -11,10 +11,10 @@ import numpy as np
 from tqdm import tqdm
 
 from epuck_mj.host.files import write_text, writing
-from evolution.gap.figure import abroad_figure
+from evolution.gap.figure import gap_figure
 from evolution.gap.gap_document import gap_document, gap_summary
 from evolution.gap.groups import experiments, labels, peers
-from evolution.gap.outcomes import Outcome, abroad, ideal
+from evolution.gap.outcomes import Outcome, ideal, in_worlds
 from evolution.gap.transfer import Gap, Transfer, verdict
 from evolution.gap.worlds import KINDS, World, worlds
 from evolution.named_policies import NamedPolicy
@@ -26,8 +26,8 @@ Places = Mapping[str, Sequence[World]]
 """Worlds by their kind."""
 
 Measured = dict[str, tuple[list[Outcome], list[list[Outcome]], list[list[Outcome]]]]
-"""For each kind of worlds, outcomes at home, on ideal robots in each world's arena, and
-in each world."""
+"""For each kind of worlds, outcomes in nominal conditions, on ideal robots in each
+world's arena, and in each world."""
 
 
 def write_gap(
@@ -45,7 +45,7 @@ def write_gap(
         policies: who is tested.
         robots: that drive.
         n_worlds: how many of each kind.
-        starts: test starts in each world, and at home.
+        starts: test starts in each world, and in nominal conditions.
         threads: threads that step the robots; 0 is one per core.
 
     Raises:
@@ -65,14 +65,14 @@ def _measured(
     n: int,
     threads: int,
 ) -> Measured:
-    home = ideal(policies, robot, n, threads)
+    nominal = ideal(policies, robot, n, threads)
     everywhere = [place for each in places.values() for place in each]
     arenas = {
         arena: ideal(policies, robot, n, threads, arena)
         for arena in dict.fromkeys(place.arena for place in everywhere)
     }
     bar = tqdm(
-        abroad(policies, everywhere, robot, n, threads),
+        in_worlds(policies, everywhere, robot, n, threads),
         total=len(everywhere),
         unit="world",
         desc=robot,
@@ -81,7 +81,7 @@ def _measured(
     outcomes = iter(bar)
     return {
         kind: (
-            home,
+            nominal,
             [arenas[place.arena] for place in each],
             list(islice(outcomes, len(each))),
         )
@@ -122,7 +122,9 @@ def _write(
                     policy.name: {
                         **asdict(verdict(gap.transfers[robot], i)),
                         "ideal": [world[i].fitness for world in outcomes[gap.kind][1]],
-                        "abroad": [asdict(world[i]) for world in outcomes[gap.kind][2]],
+                        "in_worlds": [
+                            asdict(world[i]) for world in outcomes[gap.kind][2]
+                        ],
                     }
                     for i, policy in enumerate(policies)
                 }
@@ -137,7 +139,7 @@ def _write(
         write_text(folder / "gap.md", to_markdown(gap_document(gaps)))
         write_text(folder / "summary.md", to_markdown([gap_summary(gaps)]))
     names = labels(policies, gaps[0].groups)
-    write_figure(abroad_figure(gaps, names), folder, "gap")
+    write_figure(gap_figure(gaps, names), folder, "gap")
 
 
 def _rows(places: Places, gaps: Sequence[Gap]) -> str:

@@ -48,7 +48,7 @@ def _with(name: str, variant: str) -> str:
 def peers(policies: Sequence[NamedPolicy]) -> dict[str, list[int]]:
     """Policies by their full speed.
 
-    A slower one earns less at home and keeps more of it wherever it is: in one ranking
+    A slower one has less nominal fitness and keeps more of it anywhere: in one ranking
     that would pass for a relation of the two.
     """
     found: dict[str, list[int]] = {}

@@ -36,7 +36,7 @@ class Outcome:
     crash_rate: float
 
 
-def check_homes(policies: Sequence[NamedPolicy], robots: Sequence[str]) -> None:
+def check_nominal(policies: Sequence[NamedPolicy], robots: Sequence[str]) -> None:
     """Refuse robots and arenas that cannot be used, before the work is done.
 
     Raises:
@@ -73,7 +73,7 @@ def ideal(
     return [found[i] for i in range(len(policies))]
 
 
-def abroad(
+def in_worlds(
     policies: Sequence[NamedPolicy],
     worlds: Sequence[World],
     robot: str,
@@ -82,7 +82,8 @@ def abroad(
 ) -> Iterator[list[Outcome]]:
     """Outcomes of all policies in each world, on `n` starts of its own.
 
-    They all meet the same robot and the same noise; a trial lasts as long as at home.
+    They all meet the same robot and the same noise. A trial lasts as long as in
+    evolution.
     """
     groups = _alike(policies, lambda each: (each.start_clearance, each.task))
     most = max(map(len, groups.values()))

@@ -1,6 +1,6 @@
 """Slowed policies: the control of what speed alone does.
 
-A champion that is driven slower earns less at home and crashes less abroad, without any
+A champion that is driven slower has less fitness and crashes less often, without any
 evolution. What another one has learned is what it has more than that.
 """
 

@@ -25,16 +25,17 @@ class Transfer:
     """Fitness and collisions of policies `(p,)` in worlds `(w,)`.
 
     Attributes:
-        home: mean step fitness at home, `(p,)`.
-        reference: what it is measured against in each world, `(w, p)`: fitness at home,
-            or on an ideal robot in that world's arena if that is more. Else a small
-            arena, where walls are soon found, would hide what sensors and motors cost.
+        nominal: mean step fitness of ideal robots where they evolved, `(p,)`.
+        reference: what it is measured against in each world, `(w, p)`: the nominal
+            fitness, or that of an ideal robot in the world's arena if that is more.
+            Else a small arena, where walls are soon found, would hide what sensors and
+            motors cost.
         fitness: mean step fitness in each world, `(w, p)`.
         collisions: per minute, `(w, p)`.
         crash_rate: share of the trials that ended in a crash, `(w, p)`.
     """
 
-    home: np.ndarray
+    nominal: np.ndarray
     reference: np.ndarray
     fitness: np.ndarray
     collisions: np.ndarray
@@ -43,25 +44,25 @@ class Transfer:
     @classmethod
     def of(
         cls,
-        home: Sequence[Outcome],
+        nominal: Sequence[Outcome],
         ideal: Sequence[Sequence[Outcome]],
-        abroad: Sequence[Sequence[Outcome]],
+        in_worlds: Sequence[Sequence[Outcome]],
     ) -> "Transfer":
         """The transfer that was measured.
 
         Args:
-            home: an outcome per policy.
+            nominal: an outcome per policy.
             ideal: for each world, those on ideal robots in its arena.
-            abroad: for each world, those in it.
+            in_worlds: for each world, those in it.
         """
-        own = np.array([outcome.fitness for outcome in home])
+        own = np.array([outcome.fitness for outcome in nominal])
         there = np.array([[o.fitness for o in world] for world in ideal])
         return cls(
             own,
             np.maximum(own, there),
-            np.array([[o.fitness for o in world] for world in abroad]),
-            np.array([[o.collisions_per_minute for o in world] for world in abroad]),
-            np.array([[o.crash_rate for o in world] for world in abroad]),
+            np.array([[o.fitness for o in world] for world in in_worlds]),
+            np.array([[o.collisions_per_minute for o in world] for world in in_worlds]),
+            np.array([[o.crash_rate for o in world] for world in in_worlds]),
         )
 
     @property
@@ -75,9 +76,9 @@ class Transfer:
         return self._mastered(self.share)
 
     @property
-    def mastered_against_home(self) -> np.ndarray:
-        """Which worlds each policy masters against its fitness at home, `(w, p)`."""
-        return self._mastered(_share(self.fitness, self.home))
+    def mastered_against_nominal(self) -> np.ndarray:
+        """Which worlds each policy masters against its nominal fitness, `(w, p)`."""
+        return self._mastered(_share(self.fitness, self.nominal))
 
     def _mastered(self, share: np.ndarray) -> np.ndarray:
         return (share >= SHARE_KEPT) & (self.collisions < COLLISIONS_MAX)
@@ -93,7 +94,7 @@ class Gap:
         transfers: by robot, at least one.
         groups: indices of the policies of each experiment.
         peers: indices of the policies of each speed.
-        starts: of each world, and at home.
+        starts: of each world, and in nominal conditions.
         latency: of each world, in control steps, `(w,)`.
     """
 
@@ -111,7 +112,7 @@ class Verdict:
     """Summary of one policy in all worlds.
 
     Attributes:
-        home: mean step fitness at home.
+        nominal: mean step fitness of ideal robots where it evolved.
         fitness: mean step fitness in the worlds.
         crash_rate: mean share of the trials there that ended in a crash.
         share: mean share kept over the worlds.
@@ -120,7 +121,7 @@ class Verdict:
         mastered: share of the worlds that were mastered.
     """
 
-    home: float
+    nominal: float
     fitness: Interval
     crash_rate: Interval
     share: Interval
@@ -134,7 +135,7 @@ def verdict(transfer: Transfer, policy: int) -> Verdict:
     rng = np.random.default_rng(0)
     share, mastered = transfer.share[:, policy], transfer.mastered[:, policy]
     return Verdict(
-        home=float(transfer.home[policy]),
+        nominal=float(transfer.nominal[policy]),
         fitness=mean_interval(transfer.fitness[:, policy], rng),
         crash_rate=mean_interval(transfer.crash_rate[:, policy], rng),
         share=mean_interval(share, rng),
@@ -149,11 +150,12 @@ def rank_correlations(
 ) -> dict[str, float] | None:
     """Spearman's rank correlations of policies; None if there are too few.
 
-    `home`: between home and a world, the mean over the worlds. `worlds`: between two
-    worlds, the mean over all pairs. Worlds where all fare alike say nothing.
+    `nominal`: between nominal fitness and a world, the mean over the worlds. `worlds`:
+    between two worlds, the mean over all pairs. Worlds where all fare alike say
+    nothing.
     """
-    home, fitness = transfer.home[members], transfer.fitness[:, members]
-    found = [rank_correlation(home, world) for world in fitness]
+    nominal, fitness = transfer.nominal[members], transfer.fitness[:, members]
+    found = [rank_correlation(nominal, world) for world in fitness]
     own = [each for each in found if each is not None]
     if len(own) < 2:
         return None
@@ -162,7 +164,7 @@ def rank_correlations(
     told = fitness[np.ptp(fitness, axis=1) > 0]
     between = np.corrcoef(stats.rankdata(told, axis=1))
     return {
-        "home": float(np.mean(own)),
+        "nominal": float(np.mean(own)),
         "worlds": float(between[np.triu_indices(len(told), 1)].mean()),
     }
 
