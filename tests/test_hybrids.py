@@ -135,6 +135,8 @@ def test_the_page_shows_every_experiment(tmp_path, monkeypatch):
     assert report_hybrids(["x", "--output", str(tmp_path)]) == 0
     text = (tmp_path / "hybrids.md").read_text()
     assert "10 experiments of 150,000 trials" in text and "120 runs" in text
+    # no study of a test has margins
+    assert "How close to the edge" not in text
     for name in FITNESS:
         assert f"| {label(study(FITNESS), name)} | 12 |" in text
     for form in ("svg", "pdf", "png"):

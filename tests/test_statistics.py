@@ -23,6 +23,7 @@ from evolution.statistics.targets import (
     evaluations_to_target,
     expected_running_time,
     expected_running_time_interval,
+    mean_best_so_far,
 )
 
 SAMPLES = st.lists(st.integers(-5, 5), min_size=1, max_size=12).map(np.array)
@@ -302,6 +303,18 @@ def test_quartiles_worked_by_hand():
 
 
 # targets
+
+
+def test_mean_best_so_far_worked_by_hand():
+    evaluations, best = np.array([10, 20, 40]), np.array([3.0, 1.0, 8.0])
+    # nothing for 10, 3 for 30; what comes last had no time
+    assert mean_best_so_far(evaluations, best) == (0 * 10 + 3 * 30) / 40
+    # whoever is earlier has more
+    assert mean_best_so_far(evaluations, best[::-1]) == 8 * 30 / 40
+    # generations without a rise may be left out
+    assert mean_best_so_far(evaluations[[0, 2]], best[[0, 2]]) == 90 / 40
+    with pytest.raises(ValueError, match="as many evaluations"):
+        mean_best_so_far(evaluations, best[:2])
 
 
 def test_evaluations_to_target_worked_by_hand():

@@ -17,7 +17,7 @@ from evolution.statistics.significance import (
     holm,
     mann_whitney,
 )
-from evolution.statistics.targets import evaluations_to_target
+from evolution.statistics.targets import evaluations_to_target, mean_best_so_far
 from evolution.study.data import StudyData
 
 BASE = "de-best"
@@ -121,6 +121,12 @@ def trials_to_useful(data: StudyData, name: str) -> np.ndarray:
             for run in data.runs[name]
         ]
     )
+
+
+def means_so_far(data: StudyData, name: str) -> np.ndarray:
+    """Stored best so far, the mean over the budget, `(runs,)`."""
+    histories = (run.history for run in data.runs[name])
+    return np.array([mean_best_so_far(h["evaluations"], h["best"]) for h in histories])
 
 
 def crash_rates(data: StudyData, name: str) -> np.ndarray:

@@ -11,6 +11,7 @@ from evolution.hybrids.compared import (
     against_base,
     against_control,
     crash_rates,
+    means_so_far,
     median_with_never,
     sweep,
     trials_to_useful,
@@ -24,6 +25,7 @@ from evolution.pages.words import (
     probability,
     spread,
 )
+from evolution.report.sections.margins import margins_section
 from evolution.study.data import StudyData
 
 
@@ -51,6 +53,7 @@ def hybrids_page(data: StudyData, pictures: Sequence[Picture]) -> list[Block]:
         Heading("How much of the budget for lessons"),
         sweep_table(data),
         *others,
+        *margins_section(data),
     ]
 
 
@@ -64,6 +67,7 @@ def worth_table(data: StudyData) -> Table:
             "held-out, epuck_kinematic",
             "crash, epuck [%]",
             f"trials to {USEFUL:.0f} stored",
+            "stored best so far, mean over the budget",
         ),
         [
             (
@@ -73,6 +77,7 @@ def worth_table(data: StudyData) -> Table:
                 spread(data.held_out(name, KINEMATIC_ROBOT)),
                 percent_median(crash_rates(data, name)),
                 _trials(data, name),
+                spread(means_so_far(data, name)),
             )
             for name, runs in data.with_runs.items()
         ],

@@ -30,14 +30,41 @@ def evaluations_to_target(
     Raises:
         ValueError: if a history is empty, not finite or its parts differ in length.
     """
+    evaluations, best = _checked_history(evaluations, best)
+    reached = best >= target
+    return float(evaluations[reached.argmax()]) if reached.any() else math.nan
+
+
+def _checked_history(
+    evaluations: np.ndarray, best: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     evaluations, best = checked_sample(evaluations), checked_sample(best)
     if evaluations.size != best.size:
         raise ValueError(
             f"expected as many evaluations as best fitnesses,"
             f" got {evaluations.size} and {best.size}"
         )
-    reached = best >= target
-    return float(evaluations[reached.argmax()]) if reached.any() else math.nan
+    return evaluations, best
+
+
+def mean_best_so_far(evaluations: np.ndarray, best: np.ndarray) -> float:
+    """Mean over the evaluations of a run of its best fitness so far.
+
+    The area under the curve of the best so far, divided by the evaluations. Before the
+    first generation, it is 0.
+
+    Args:
+        evaluations: spent after each generation, `(generations,)`, increasing.
+        best: best fitness of each generation, `(generations,)`; it may fall again.
+
+    Raises:
+        ValueError: if a history is empty, not finite or its parts differ in length.
+    """
+    evaluations, best = _checked_history(evaluations, best)
+    # what a generation reached holds until the next one
+    lasted = np.diff(evaluations)
+    so_far = np.maximum.accumulate(best)[:-1]
+    return float((so_far * lasted).sum() / evaluations[-1])
 
 
 def expected_running_time(hits: np.ndarray, spent: np.ndarray) -> float:
