@@ -8,6 +8,8 @@ LESSON := runs/lesson
 MKDOCS := NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs
 CHAMPION := results/paper/de-best/seed-1
 PAPERS := de-best de-rand ga
+ROBUST := 1 2 3 4 5 6 7 8 9 10
+NETWORKS := robust-feedforward-changes robust-feedforward
 
 .PHONY: run test docs docs-serve bench ladder convergence racing overhead recording bridge ppo gap results figures clean
 
@@ -66,12 +68,13 @@ ppo: $(INSTALLED)
 	  --json results/ppo/test.json
 	$(BIN)/python -m benchmarks.ppo.figure
 
-# champions of three seeds of each experiment in other worlds, kinematic and on wheels;
-# fast ones are also driven slower
+# champions in other worlds, kinematic and on wheels; fast ones are also driven slower
 gap: $(INSTALLED)
 	$(BIN)/python -m evolution.gap \
 	  $(foreach seed,1 2 3,$(PAPERS:%=results/paper/%/seed-$(seed))) \
-	  results/transfer wall-follower --speeds 0.04 0.08 --output results/gap
+	  results/transfer $(ROBUST:%=results/real-robots/robust/seed-%) \
+	  $(foreach seed,1 2 3,$(NETWORKS:%=results/real-robots/%/seed-$(seed))) \
+	  wall-follower --starts 10 --speeds 0.04 0.08 --output results/gap
 
 # what git keeps of the studies in runs/, and everything that is made of it
 results: $(INSTALLED)
