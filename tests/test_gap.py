@@ -162,8 +162,8 @@ def test_a_world_like_home_keeps_everything(robot):
     worse = replace(HOME, latency=3, curve=0.7)
     ((hurt,),) = abroad([FOLLOWER], [worse], robot, 20, 1)
     assert hurt.fitness < 0.5 * home.fitness
-    # so wide that its sensors see from farther in: no more room beside a wall
-    thick = replace(HOME, body_radius=0.037, set_back=0.002)
+    # so wide that its sensors are farther out: walls seem nearer
+    thick = replace(HOME, body_radius=0.037)
     ((wide,),) = abroad([FOLLOWER], [thick], robot, 20, 1)
     assert wide.fitness != same.fitness
 
