@@ -47,8 +47,8 @@ class Options:
         generations: test the best individuals of these generations instead of the
             champions: numbers from 0 on, or last, separated by commas.
         starts: number of test starts; always the first of the same sequence.
-        robot: robot to test on; if not given, epuck and epuck_kinematic, or epuck and
-            the robot that the champion evolved on, if that is another one.
+        robot: robot to test on; if not given, the one that the champion evolved on,
+            kinematic and on wheels; of an MJCF of your own, that robot and epuck.
         arena: arena to test in; if not given, the one that the champion evolved in.
         robots: noise and differences of the robots; ideal robots if not given.
         threads: threads that step the robots; 0 is one per core. Changes no result.

@@ -6,7 +6,7 @@ earlier generations, and the hand-written wall follower.
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.policies.file import ControllerFile, load_controller
 from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT, on_wheels
 from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import START_CLEARANCE, Policy, TaskParameters
 from evolution.judging.scores import KnownScores
@@ -63,6 +63,12 @@ class NamedPolicy:
     def name(self) -> str:
         """Name of the policy beside others."""
         return f"{self.source} {self.variant}".rstrip()
+
+
+def common_wheels(policies: Sequence[NamedPolicy]) -> str:
+    """The shipped robot on wheels of all policies; `epuck` where they differ."""
+    found = {on_wheels(policy.robot) for policy in policies}
+    return found.pop() if len(found) == 1 else WHEELED_ROBOT
 
 
 def named_policies(path: str, generations: str | None = None) -> list[NamedPolicy]:

@@ -3,11 +3,17 @@
 import numpy as np
 import pytest
 
+from epuck_mj.scene.model import load_scene
+from epuck_mj.scene.model_files import ON_WHEELS
 from evolution.judging.evaluation import BatchEngine, Work
 from evolution.run.champion import candidates, choose_champion, most_believed, stored_by
+from evolution.run.directory import RunDirectory
+from evolution.run.execution import Run
 from evolution.run.generation_loop import Evolution
+from evolution.run.means import Means
 from evolution.search.ask_tell import AskTellError
 from evolution.settings.config import ExperimentConfig
+from evolution.verify.__main__ import verify
 
 OPTIMIZERS = {
     "ga": {
@@ -86,6 +92,31 @@ class Watched:
     def run(self, work: Work):
         self._seen.append((self._name, len(work)))
         return self._engine.run(work)
+
+
+@pytest.mark.parametrize(("robot", "wheels"), ON_WHEELS.items())
+def test_each_kinematic_robot_climbs_to_its_own_on_wheels(tmp_path, robot, wheels):
+    """There its champion is chosen, tested and, with the run, verified."""
+    c = config(robot=robot, test_starts=5)
+    run = Run(c, RunDirectory(tmp_path / "run", drawn=False), Means(threads=1), [])
+    run.start()
+    list(run.evolve())
+    scores = run.finish()
+    robots = [line.split(",")[-1] for line in run.evolution.history().splitlines()[1:]]
+    assert robots == [robot] * 5 + [wheels] * 4
+    assert list(scores.held_out) == [wheels, robot]
+    assert scores.most_believed is not None
+    assert scores.most_believed.robot == wheels
+    assert scores.in_lines(15).startswith("The champion earns")
+    assert f"fresh starts on {wheels};" in scores.in_lines(15)
+    champion = choose_champion(
+        BatchEngine(run.evolution.scene, c.task, 1),
+        run.evolution,
+        stored_by(run.evolution),
+        BatchEngine(load_scene(wheels, "arena"), c.task, 1),
+    )
+    assert champion.validation_fitness == scores.validation
+    assert verify([str(tmp_path / "run"), "--threads", "1"]) == 0
 
 
 @pytest.mark.parametrize("name", OF_EIGHT)

@@ -162,8 +162,8 @@ def test_a_nominal_world_keeps_everything(robot):
     worse = replace(NOMINAL, latency=3, curve=0.7)
     ((hurt,),) = in_worlds([FOLLOWER], [worse], robot, 20, 1)
     assert hurt.fitness < 0.5 * nominal.fitness
-    # so wide that its sensors see from farther in: no more room beside a wall
-    thick = replace(NOMINAL, body_radius=0.037, set_back=0.002)
+    # so wide that its sensors are farther out: walls seem nearer
+    thick = replace(NOMINAL, body_radius=0.037)
     ((wide,),) = in_worlds([FOLLOWER], [thick], robot, 20, 1)
     assert wide.fitness != same.fitness
 

@@ -34,7 +34,7 @@ from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.rungs.table import compiled_trials, robots_in
 from epuck_mj.scene.clearance import CLEARANCE_MAX, ClearanceProbe
 from epuck_mj.scene.model import Scene, load_scene
-from epuck_mj.scene.model_files import MODELS
+from epuck_mj.scene.model_files import MODELS, ON_WHEELS
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.bodies import Bodies
 from epuck_mj.step.conditions import Conditions
@@ -381,28 +381,24 @@ print(evolution.history())
 """
 
 CONFIG = """
-robot: epuck_kinematic
+robot: {robot}
 evaluations: 120
 steps: 60
 trials: 3
-noise: {noise}
-optimizer: {{algorithm: {algorithm}, {more}}}
+noise: calibrated
+optimizer:
+  algorithm: differential_evolution
+  strategy: best
+  population: 30
+  scale: 0.7
+  crossover: 0.9
 """
 
 
-@pytest.mark.parametrize(
-    ("algorithm", "more", "noise"),
-    [
-        (
-            "differential_evolution",
-            "strategy: best, population: 30, scale: 0.7, crossover: 0.9",
-            "calibrated",
-        ),
-    ],
-)
-def test_every_processor_gives_the_same_bits(algorithm, more, noise):
+@pytest.mark.parametrize("robot", ON_WHEELS)
+def test_every_processor_gives_the_same_bits(robot):
     """One without any extensions, numpy's own choice of them switched off."""
-    text = CONFIG.format(algorithm=algorithm, more=more, noise=noise)
+    text = CONFIG.format(robot=robot)
     plain = {
         "NUMBA_CPU_NAME": "generic",
         "NUMBA_CPU_FEATURES": "",

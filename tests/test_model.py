@@ -10,7 +10,7 @@ from epuck_mj.check.findings import Severity
 from epuck_mj.errors import UserError
 from epuck_mj.rungs.table import RUNGS
 from epuck_mj.scene.model import load_scene
-from epuck_mj.scene.model_files import MODELS
+from epuck_mj.scene.model_files import MODELS, ON_WHEELS, ROBOT_FILES
 from epuck_mj.scene.robot_parts import PREFIX, PROXIMITY, ROBOT_BODY
 
 
@@ -211,7 +211,7 @@ def test_meshes_are_looked_for_beside_the_arena_and_beside_the_robot(
 def test_a_copied_arena_needs_no_copied_robot(tmp_path, robot):
     path = tmp_path / "copy.xml"
     path.write_text((MODELS / "arena.xml").read_text())
-    assert load_scene(robot, str(path)).robot == MODELS / "epuck.xml"
+    assert load_scene(robot, str(path)).robot == MODELS / ROBOT_FILES[robot]
 
 
 def refusal(robot="epuck", arena="arena", control_step=0.1) -> str:
@@ -234,7 +234,7 @@ def edited(tmp_path, old: str, new: str, source: str = "epuck.xml"):
 def test_unknown_names_are_refused():
     assert refusal(robot="e-puck") == (
         "no robot 'e-puck': expected the path of an MJCF file or one of "
-        "epuck_kinematic, epuck"
+        "epuck_kinematic, epuck, epuck_cone_kinematic, epuck_cone"
     )
     assert "one of arena" in refusal(arena="no/such.xml")
 
@@ -309,8 +309,9 @@ def test_wheels_need_a_floor(tmp_path, robot):
     assert "has no floor for the robot's wheels" in refusal(robot, path)
 
 
-def test_a_file_with_the_kinematic_robots_name_is_refused(tmp_path):
-    path = tmp_path / "epuck_kinematic.xml"
+@pytest.mark.parametrize("name", ON_WHEELS)
+def test_a_file_with_a_kinematic_robots_name_is_refused(tmp_path, name):
+    path = tmp_path / f"{name}.xml"
     path.write_text((MODELS / "epuck.xml").read_text())
     with pytest.raises(UserError, match="expected another file name"):
         load_scene(str(path), "arena")

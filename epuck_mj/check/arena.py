@@ -46,7 +46,7 @@ from epuck_mj.check.walls import (
 from epuck_mj.errors import UserError
 from epuck_mj.scene.floor import BadGeom
 from epuck_mj.scene.model import Scene, load_scene
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT, find_arena
+from epuck_mj.scene.model_files import find_arena, is_kinematic
 from epuck_mj.scene.source_files import SourceFiles
 from epuck_mj.scene.starts import FreeSpace, Grid, survey
 from epuck_mj.scene.xml_elements import BadXml
@@ -191,7 +191,7 @@ def _robot_findings(
     rng = np.random.default_rng(SEED)
     starts = FreeSpace(scene, START_CLEARANCE).sample(rng, N_STARTS)
     place = Place(scene.arena)
-    if robot == KINEMATIC_ROBOT:
+    if is_kinematic(robot):
         try:
             return drive_findings(scene, robot, starts, topic, place)
         except UserError as problem:

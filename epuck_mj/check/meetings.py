@@ -7,7 +7,7 @@ import numpy as np
 from mujoco.batch import Batch
 
 from epuck_mj.check.approaches import approaches
-from epuck_mj.constants import BODY_RADIUS
+from epuck_mj.constants import BODY_RADIUS, N_PROXIMITY
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.geometry import kinematics, walls
 from epuck_mj.scene.model import Scene
@@ -143,7 +143,7 @@ def _rays(
 def _ahead(scene: Scene, poses: np.ndarray) -> np.ndarray:
     """Least distance that the rays to the front measure [m], `(n,)`."""
     _, _, _, direction = kinematics(scene, np.zeros((1, 3)))
-    front = direction[0, :, 0] >= FRONT
+    front = direction[0, :N_PROXIMITY, 0] >= FRONT
     ahead = np.full(len(poses), np.inf)
     batch = Batch(scene.model, CHUNK, 1)
     qpos, sensordata = batch.bind("qpos"), batch.bind("sensordata")

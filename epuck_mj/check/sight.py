@@ -47,7 +47,8 @@ def sight_findings(
             where = _where(met.poses[of_geom & deep])
             findings.append(warning(TOPIC, text, place, where))
         elif (of_geom & blind).any():
-            text = "too thin for single rays: straight ahead, a robot sees nothing "
+            rays = "the rays" if scene.cosines.size else "single rays"
+            text = f"too thin for {rays}: straight ahead, a robot sees nothing "
             where = _where(met.poses[of_geom & blind])
             findings.append(warning(TOPIC, text + "until it crashes", place, where))
         elif (of_geom & through).any():
@@ -57,6 +58,8 @@ def sight_findings(
 
 def same_view(scene: Scene, other: Scene) -> bool:
     """Whether two robots hit and see alike in one arena, so one check will do."""
+    if scene.rays.shape != other.rays.shape:
+        return False
     views = []
     for one in (scene, other):
         _, _, origin, direction = kinematics(one, np.zeros((1, 3)))

@@ -31,7 +31,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.limits import check, shown
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene, load_scene
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
+from epuck_mj.scene.model_files import is_kinematic, on_wheels
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.control import START_CLEARANCE, TaskParameters
 from epuck_mj.step.fitness import StepFacts
@@ -91,10 +91,10 @@ def follow_walls(
         UserError: if robot or arena cannot be used.
     """
     parameters = parameters or TaskParameters()
-    if robot == KINEMATIC_ROBOT:
+    if is_kinematic(robot):
         raise UserError(
-            f"the task moves robots in MuJoCo: expected robot '{WHEELED_ROBOT}' or a "
-            f"path, got '{robot}'"
+            f"the task moves robots in MuJoCo: expected robot '{on_wheels(robot)}' or "
+            f"a path, got '{robot}'"
         )
     scene = load_scene(robot, arena, parameters.control_step)
     task = FollowWalls(

@@ -1,10 +1,10 @@
 """Robots with bodies of their own in MuJoCo: masses, shapes, faster wheels."""
 
-import mujoco
 import numpy as np
 
+from epuck_mj.scene.changed_robots import outward
 from epuck_mj.scene.model import Scene
-from epuck_mj.scene.robot_parts import PROXIMITY, ROBOT_BODY, SHELL
+from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL
 from epuck_mj.step.bodies import Bodies
 
 SPARE_SPEED = 2.0
@@ -58,14 +58,5 @@ def shape_fields(scene: Scene, bodies: Bodies) -> Fields:
     shell = np.array([model.geom(SHELL).id])
     size = np.repeat(model.geom_size[None, shell], len(bodies), axis=0)
     size[:, 0, 0] += bodies.wider
-    sites = np.array([model.sensor(name).objid[0] for name in PROXIMITY])
-    # a ray leaves along its site's z axis
-    away = np.array([_z_axis(model.site_quat[site]) for site in sites])
-    place = model.site_pos[sites] + bodies.outward[:, None, None] * away
-    return {"geom_size": (shell, size), "site_pos": (sites, place)}
-
-
-def _z_axis(quaternion: np.ndarray) -> np.ndarray:
-    axes = np.empty(9)
-    mujoco.mju_quat2Mat(axes, quaternion)
-    return axes.reshape(3, 3)[:, 2]
+    place = model.site_pos[scene.rays] + bodies.outward[:, None, None] * outward(scene)
+    return {"geom_size": (shell, size), "site_pos": (scene.rays, place)}

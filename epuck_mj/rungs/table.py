@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.rungs.simulator import CompiledTrials, Simulator
 from epuck_mj.scene.model import Scene
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
+from epuck_mj.scene.model_files import ROBOT_FILES, is_kinematic
 from epuck_mj.step.control import TaskParameters
 
 
@@ -21,10 +21,12 @@ def _kinematic(scene: Scene, capacity: int, threads: int) -> Simulator:
 
 
 RUNGS: Mapping[str, Callable[[Scene, int, int], Simulator]] = {
-    KINEMATIC_ROBOT: _kinematic,
-    WHEELED_ROBOT: MujocoRobots,
+    name: _kinematic if is_kinematic(name) else MujocoRobots for name in ROBOT_FILES
 }
-"""Makers of simulators by the robot's name; other robots use MuJoCo."""
+"""Makers of simulators by the robot's name; other robots use MuJoCo.
+
+A kinematic robot climbs to the one on wheels behind it: see `model_files.ON_WHEELS`.
+"""
 
 
 def robots_in(scene: Scene, capacity: int, threads: int = 0) -> Simulator:
@@ -51,7 +53,7 @@ def compiled_trials(
         threads: that run trials; 0 is one per core.
         late: control steps until a command has reached the wheels of ideal robots.
     """
-    if scene.name != KINEMATIC_ROBOT:
+    if not is_kinematic(scene.name):
         return None
     from epuck_mj.rungs.kinematic.fused import FusedTrials
     from epuck_mj.rungs.kinematic.whole_trial import FITNESS

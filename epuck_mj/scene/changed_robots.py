@@ -6,9 +6,10 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
+from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
 from epuck_mj.scene.model import Scene
-from epuck_mj.scene.robot_parts import SHELL
+from epuck_mj.scene.robot_parts import SHELL, ray_directions
 
 ROUND = (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_SPHERE)
 """Shapes whose first size is a radius, and that are as wide in every direction."""
@@ -38,12 +39,7 @@ def with_body_radius(scene: Scene, radius: float) -> Scene:
 def with_sensors_set_back(scene: Scene, back: float) -> Scene:
     """The scene with all proximity sensors so far behind the robot's edge [m]."""
     model = copy.copy(scene.model)
-    rays = model.sensor_type == mujoco.mjtSensor.mjSENS_RANGEFINDER
-    for site in np.unique(model.sensor_objid[rays]).tolist():
-        axes = np.empty(9)
-        mujoco.mju_quat2Mat(axes, model.site_quat[site])
-        # a ray leaves along its site's z axis
-        model.site_pos[site] -= back * axes.reshape(3, 3)[:, 2]
+    model.site_pos[scene.rays] -= back * outward(scene)
     return replace(scene, model=model)
 
 
@@ -56,3 +52,12 @@ def with_body_margin(scene: Scene, margin: float) -> Scene:
     if not margin:
         return scene
     return with_body_radius(scene, scene.model.geom(SHELL).size[0] + margin)
+
+
+def outward(scene: Scene) -> np.ndarray:
+    """Directions in which rays move with their sensors, as `Scene.rays`, `(rays, 3)`.
+
+    A sensor moves along its middle ray.
+    """
+    middle = ray_directions(scene.model, scene.rays[:N_PROXIMITY])
+    return np.tile(middle, (len(scene.rays) // N_PROXIMITY, 1))

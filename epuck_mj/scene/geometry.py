@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from epuck_mj.scene.model import Scene
-from epuck_mj.scene.robot_parts import PROXIMITY, SHELL, can_touch, static
+from epuck_mj.scene.robot_parts import SHELL, can_touch, static
 
 UNSET_COLOR = np.array([0.5, 0.5, 0.5, 1], np.float32)
 """Colour that MuJoCo gives to geoms without one."""
@@ -131,10 +131,9 @@ def kinematics(
 
     Returns:
         Positions [m] and quaternions of all bodies, `(n, nbody, 3)`, `(n, nbody, 4)`;
-        origins [m] and directions of the rays, `(n, 8, 3)` both.
+        origins [m] and directions of the rays, `(n, rays, 3)` both: see `Scene.rays`.
     """
-    model, data = scene.model, mujoco.MjData(scene.model)
-    sites = [model.sensor(name).objid[0] for name in PROXIMITY]
+    model, data, sites = scene.model, mujoco.MjData(scene.model), scene.rays
     position, quaternion, origin, direction = [], [], [], []
     for qpos in scene.qpos(poses):
         data.qpos[:] = qpos

@@ -17,11 +17,11 @@ import mujoco
 import numpy as np
 
 from epuck_mj.errors import UserError
+from epuck_mj.scene.cones import cosines_of, ray_names
 from epuck_mj.scene.floor import check_floor
 from epuck_mj.scene.mjcf import compiled
 from epuck_mj.scene.model_files import find_arena, find_robot
 from epuck_mj.scene.robot_parts import (
-    PROXIMITY,
     ROBOT_BODY,
     SHELL,
     WHEELS,
@@ -29,6 +29,7 @@ from epuck_mj.scene.robot_parts import (
     index_of,
     sensor_address,
 )
+from epuck_mj.step.cones import cone_distance
 from epuck_mj.step.sensors import Reading
 
 _OBJECT, _SENSOR = mujoco.mjtObj, mujoco.mjtSensor
@@ -54,6 +55,10 @@ class Scene:
         sha256: of each file compiled: `arena`, `robot`, and all others by path.
         floor: indices of geoms that were made a floor, whatever their bits were.
         height: of the floor that the robot stands on [m].
+        rays: indices of the sites of the proximity sensors' rays, `(8,)`; of sensors
+            that see cones `(24,)`: middle rays, those to the left, those to the right.
+        cosines: of the angles between middle and outer rays, `(8,)`; `(0,)` of sensors
+            with one ray.
     """
 
     model: mujoco.MjModel
@@ -65,6 +70,8 @@ class Scene:
     sha256: Mapping[str, str]
     floor: tuple[int, ...]
     height: float
+    rays: np.ndarray
+    cosines: np.ndarray
     _distance: np.ndarray
     _contact: int
     _touches: slice
@@ -124,7 +131,11 @@ class Scene:
         contact = sensordata[..., self._contact] > 0
         if history is not None:
             contact |= (history[..., self._touches] > 0).any(axis=-1)
-        return Reading(sensordata[..., self._distance], contact)
+        distance = sensordata[..., self._distance]
+        if self.cosines.size:
+            middle, left, right = np.split(distance, 3, axis=-1)
+            distance = cone_distance(middle, left, right, self.cosines)
+        return Reading(distance, contact)
 
 
 def once_per_model(measure: Measure) -> Measure:
@@ -181,9 +192,10 @@ def load_scene(
     wheels = [
         index_of(model, _OBJECT.mjOBJ_ACTUATOR, name, robot_path) for name in WHEELS
     ]
+    names = ray_names(model, robot_path)
     distance = [
         sensor_address(model, name, _SENSOR.mjSENS_RANGEFINDER, robot_path)
-        for name in PROXIMITY
+        for name in names
     ]
     contact = sensor_address(model, SHELL, _SENSOR.mjSENS_CONTACT, robot_path)
     if model.opt.timestep <= 0:
@@ -208,6 +220,8 @@ def load_scene(
         made.sha256,
         made.floor,
         made.height,
+        np.array([model.sensor(name).objid[0] for name in names]),
+        cosines_of(model, names, robot_path),
         np.array(distance),
         contact,
         _samples(model, SHELL),

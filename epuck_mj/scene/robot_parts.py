@@ -56,6 +56,17 @@ def can_touch(model: mujoco.MjModel, geom: int) -> np.ndarray:
     return ((bits[geom] & masks) | (bits & masks[geom])) != 0
 
 
+def ray_directions(model: mujoco.MjModel, sites: np.ndarray) -> np.ndarray:
+    """Directions of the rays of some sites `(n,)` in the frames of bodies, `(n, 3)`.
+
+    A ray leaves along its site's z axis.
+    """
+    axes = np.empty((len(sites), 9))
+    for i, site in enumerate(sites):
+        mujoco.mju_quat2Mat(axes[i], model.site_quat[site])
+    return axes[:, [2, 5, 8]]
+
+
 def sensor_address(model: mujoco.MjModel, name: str, kind: int, robot: Path) -> int:
     """Address in sensordata of a named sensor of a given kind.
 

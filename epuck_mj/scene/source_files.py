@@ -13,7 +13,7 @@ from pathlib import Path
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.files import is_file, read_text
-from epuck_mj.scene.model_files import ROBOT_FILE
+from epuck_mj.scene.model_files import ROBOT_FILES
 from epuck_mj.scene.robot_parts import OWN_BODY
 from epuck_mj.scene.xml_elements import BadXml, Element, elements_of
 
@@ -135,7 +135,7 @@ def _included(
         return inner
     if inner is not None:
         raise BadXml.of(element, f"'{name}' is already included")
-    if Path(name).name == ROBOT_FILE and not robots_stay:
+    if Path(name).name in ROBOT_FILES.values() and not robots_stay:
         # a copied arena may name the robot that it left behind
         found.xml[_normal(folder / name)] = NOTHING
         return None

@@ -2,8 +2,8 @@
 
 Sums, products and quotients of IEEE doubles are the same everywhere; numpy's `exp`,
 `log` and `tanh` are not, since each processor has its own. Here they are tables and
-polynomials. `rungs.kinematic.kernel` has the same operations in the same order for one
-number.
+polynomials. `rungs.kinematic.elementary` has the same operations in the same order for
+one number.
 
 Source: reduction as in fdlibm (e_exp.c, e_log.c); series of exp and of artanh.
 """

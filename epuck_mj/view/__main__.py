@@ -21,7 +21,7 @@ from epuck_mj.host.limits import check_flag
 from epuck_mj.host.yaml_and_json import read_yaml
 from epuck_mj.policies.file import champion_file, load_controller
 from epuck_mj.policies.wall_follower import WallFollower
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT
+from epuck_mj.scene.model_files import is_kinematic
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.conditions import ConditionFlags, Conditions
 from epuck_mj.step.control import START_CLEARANCE, Policy, TaskParameters
@@ -79,8 +79,8 @@ def view(argv: Sequence[str]) -> int:
                 f"{task.control_step:g} s, got {options.seconds:g}"
             )
         task = replace(task, steps=steps)
-    if options.robot == KINEMATIC_ROBOT:
-        print(f"{KINEMATIC_ROBOT} is shown on wheels, as MuJoCo moves it", flush=True)
+    if is_kinematic(options.robot):
+        print(f"{options.robot} is shown on wheels, as MuJoCo moves it", flush=True)
     # slow to import: after the checks of the command line
     from epuck_mj.rungs.watched_robot import WatchedRobot
     from epuck_mj.scene.model import load_scene

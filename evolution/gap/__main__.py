@@ -12,9 +12,9 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import check_threads, main, parse, word
 from epuck_mj.host.files import check_writable, writing
 from epuck_mj.host.limits import check_flag
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
+from epuck_mj.scene.model_files import without_physics
 from evolution.gap.slowed import with_slowed
-from evolution.named_policies import policies_of
+from evolution.named_policies import common_wheels, policies_of
 
 EXAMPLES = (
     "python -m evolution.gap results/paper --output gap",
@@ -32,7 +32,8 @@ class GapOptions:
         output: folder for gap.md, summary.md, gap.json, gap.csv and figures.
         worlds: number of worlds of each kind.
         starts: number of test starts in each world and in the arena of evolution.
-        robot: robot that drives; epuck_kinematic and epuck if not given.
+        robot: robot that drives; if not given, the one that all evolved on, kinematic
+            and on wheels, or else epuck_kinematic and epuck.
         speeds: drive every policy at these full speeds, too, if it is faster [m/s].
         threads: threads that step the robots; 0 is one per core. Changes no result.
     """
@@ -55,7 +56,9 @@ def measure_gap(argv: Sequence[str]) -> int:
         check_flag("speeds", speed, "v_max")
     check_threads(options.threads)
     policies = with_slowed(policies_of(dict.fromkeys(options.paths)), options.speeds)
-    robots = [options.robot] if options.robot else [KINEMATIC_ROBOT, WHEELED_ROBOT]
+    wheels = common_wheels(policies)
+    kinematic = without_physics(wheels)
+    robots = [options.robot] if options.robot else [kinematic, wheels]
     # slow to import
     from evolution.gap.gap_folder import write_gap
     from evolution.gap.outcomes import check_nominal
@@ -66,9 +69,9 @@ def measure_gap(argv: Sequence[str]) -> int:
         if options.robot:
             raise
         # on wheels only, if all arenas allow that
-        robots = [WHEELED_ROBOT]
+        robots = [wheels]
         check_nominal(policies, robots)
-        print(f"not driven on {KINEMATIC_ROBOT}: {problem}", file=sys.stderr)
+        print(f"not driven on {kinematic}: {problem}", file=sys.stderr)
     with writing():
         options.output.mkdir(parents=True, exist_ok=True)
     check_writable(options.output / "gap.md")

@@ -12,7 +12,7 @@ from epuck_mj.policies.topology import Topology
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.clearance import ClearanceProbe
 from epuck_mj.scene.model import Scene, load_scene
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
+from epuck_mj.scene.model_files import is_kinematic, on_wheels, without_physics
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.scene.wall_loops import wall_loops
 from epuck_mj.step.control import Everybody, Policy, TaskParameters
@@ -31,14 +31,13 @@ INTERVAL_SEED = 0
 
 
 def tested_on(robot: str) -> list[str]:
-    """Robots on which a robot's champions are tested; one is `epuck`, on wheels.
+    """Robots on which a robot's champions are tested; one is a shipped one on wheels.
 
-    Stored fitness is compared with tests on the first: on wheels for champions of the
-    kinematic robot, too.
+    Stored fitness is compared with tests on the first: on wheels for champions of
+    kinematic robots, too.
     """
-    if robot in (KINEMATIC_ROBOT, WHEELED_ROBOT):
-        return [WHEELED_ROBOT, KINEMATIC_ROBOT]
-    return [robot, WHEELED_ROBOT]
+    wheels, kinematic = on_wheels(robot), without_physics(robot)
+    return [wheels, kinematic] if robot in (wheels, kinematic) else [robot, wheels]
 
 
 class Judges:
@@ -78,13 +77,13 @@ class Judges:
     def refusal(self, robot: str, setting: Setting) -> str | None:
         """Why champions are not tested on a robot in an arena, in one line; or None.
 
-        Only the kinematic robot may be left out: where a wall has no exact outline it
+        Only a kinematic robot may be left out: where a wall has no exact outline it
         cannot drive, and a test on wheels is enough.
 
         Raises:
             UserError: as `of`.
         """
-        if robot != KINEMATIC_ROBOT:
+        if not is_kinematic(robot):
             return None
         if (robot, setting) not in self._refused:
             refusal, scene = None, self.of(robot, setting).scene

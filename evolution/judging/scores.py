@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from epuck_mj.errors import UserError
 from epuck_mj.policies.file import ControllerFile, load_controller
-from epuck_mj.scene.model_files import WHEELED_ROBOT
+from epuck_mj.scene.model_files import is_on_wheels
 from epuck_mj.step.fitness import of_most
 from evolution.settings.config_fields import within
 
@@ -120,7 +120,7 @@ class Scores(_Record, frozen=True):
     Attributes:
         stored: fitness that evolution believes in.
         validation: mean on the validation starts, which chose it; nan if unknown.
-        held_out: tests on the test starts by robot; one is `epuck`, on wheels.
+        held_out: tests on the test starts by robot; one is a shipped one on wheels.
         most_believed: the individual that the run believed most in; None if unknown.
         held_out_as_evolved: tests with the disturbances it evolved with, by robot.
     """
@@ -169,7 +169,7 @@ class Scores(_Record, frozen=True):
 
 def _wheels_first(tests: Mapping[str, HeldOut]) -> dict[str, HeldOut]:
     """The tests by robot: what is reported first."""
-    return dict(sorted(tests.items(), key=lambda test: test[0] != WHEELED_ROBOT))
+    return dict(sorted(tests.items(), key=lambda test: not is_on_wheels(test[0])))
 
 
 def _in_words(tests: Mapping[str, HeldOut]) -> str:

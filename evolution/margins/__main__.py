@@ -49,6 +49,7 @@ def measure_margins(argv: Sequence[str]) -> int:
     from tqdm import tqdm
 
     from epuck_mj.policies.wall_follower import YARDSTICK, WallFollower
+    from epuck_mj.scene.model_files import without_physics
     from evolution.margins.margins_table import FILE, rows_of, write_margins
     from evolution.margins.measuring import margins_of_genomes, margins_of_policy
     from evolution.study.data import load_study
@@ -57,6 +58,7 @@ def measure_margins(argv: Sequence[str]) -> int:
     path = options.study / FILE
     check_writable(path)
     n, threads, parts = options.starts, options.threads, []
+    kinematic = without_physics(data.wheels)
     bar = tqdm(
         data.with_runs.items(), unit="experiment", disable=not sys.stderr.isatty()
     )
@@ -64,10 +66,12 @@ def measure_margins(argv: Sequence[str]) -> int:
         config = data.configs[name]
         genomes = np.array([run.champion.genome for run in runs])
         seeds = [run.seed for run in runs]
-        found = margins_of_genomes(config.setting, config.topology, genomes, n, threads)
+        found = margins_of_genomes(
+            config.setting, config.topology, genomes, n, threads, kinematic
+        )
         parts += [rows_of(name, seeds, margin) for margin in found]
     setting = next(iter(data.configs.values())).setting
-    by_hand = margins_of_policy(setting, WallFollower(), n, threads)
+    by_hand = margins_of_policy(setting, WallFollower(), n, threads, kinematic)
     parts += [rows_of(YARDSTICK, [0], margin) for margin in by_hand]
     write_margins(path, parts)
     print(f"Margins: {path}")

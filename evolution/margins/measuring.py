@@ -38,6 +38,7 @@ def margins_of_genomes(
     genomes: np.ndarray,
     n: int,
     threads: int = 0,
+    robot: str = KINEMATIC_ROBOT,
 ) -> Iterator[Margin]:
     """Networks on every changed robot, on the first test starts.
 
@@ -47,6 +48,7 @@ def margins_of_genomes(
         genomes: `(policies, genes)`.
         n: number of starts.
         threads: that step the robots; 0 is one per core.
+        robot: kinematic robot that is changed.
 
     Raises:
         UserError: if the kinematic robot cannot drive in the arena.
@@ -56,11 +58,15 @@ def margins_of_genomes(
         found = evaluate(engine, topology, genomes, starts)
         return found.fitness, found.crashed.mean(axis=-1)
 
-    return _margins(setting, n, threads, run)
+    return _margins(setting, n, threads, robot, run)
 
 
 def margins_of_policy(
-    setting: Setting, policy: Policy, n: int, threads: int = 0
+    setting: Setting,
+    policy: Policy,
+    n: int,
+    threads: int = 0,
+    robot: str = KINEMATIC_ROBOT,
 ) -> Iterator[Margin]:
     """One policy of any kind on every changed robot; see `margins_of_genomes`."""
 
@@ -68,16 +74,18 @@ def margins_of_policy(
         trials = engine.run(Work(Everybody(policy), starts))
         return trials.fitness.mean(keepdims=True), trials.crashed.mean(keepdims=True)
 
-    return _margins(setting, n, threads, run)
+    return _margins(setting, n, threads, robot, run)
 
 
 Run = Callable[[BatchEngine, np.ndarray], tuple[np.ndarray, np.ndarray]]
 """Gives fitness and crash rates, `(policies,)`, on starts `(n, 3)`."""
 
 
-def _margins(setting: Setting, n: int, threads: int, run: Run) -> Iterator[Margin]:
+def _margins(
+    setting: Setting, n: int, threads: int, robot: str, run: Run
+) -> Iterator[Margin]:
     task = setting.task
-    scene = load_scene(KINEMATIC_ROBOT, setting.arena, task.control_step)
+    scene = load_scene(robot, setting.arena, task.control_step)
     # the same starts for all changes: poses where the robot of evolution has room
     starts = starts_for_test(FreeSpace(scene, setting.start_clearance), n)
     for name, change in CHANGES.items():

@@ -54,6 +54,8 @@ The paper says "at least three". Of more runs, a low best would be even rarer.
 ROBOT_NAMES: Mapping[str, str] = {
     "epuck_kinematic": "kinematic robot",
     "epuck": "wheeled robot",
+    "epuck_cone_kinematic": "kinematic robot that sees cones",
+    "epuck_cone": "wheeled robot that sees cones",
 }
 
 YARDSTICK_LABEL = "hand-written wall follower"

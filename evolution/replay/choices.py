@@ -21,7 +21,7 @@ from evolution.judging.held_out_starts import (
     starts_for_test,
     starts_for_validation,
 )
-from evolution.named_policies import NamedPolicy
+from evolution.named_policies import NamedPolicy, common_wheels
 from evolution.replay.options import Options
 from evolution.settings.config_fields import N_TEST, N_VALIDATION
 from evolution.settings.randomness import Purpose
@@ -101,7 +101,8 @@ def scene_for(options: Options, policies: Sequence[NamedPolicy]) -> Scene:
             f"expected policies with the same control step, got {sorted(control_steps)}"
         )
     arena = options.arena or next(iter(arenas))
-    return load_scene(options.robot, arena, control_steps.pop())
+    robot = options.robot or common_wheels(policies)
+    return load_scene(robot, arena, control_steps.pop())
 
 
 def starts_for(

@@ -7,7 +7,6 @@ from typing import Annotated
 import tyro
 
 from epuck_mj.host.command_line import word
-from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.step.conditions import ConditionFlags
 
 
@@ -28,7 +27,8 @@ class Options:
             on the start among the first 25 where the policy has its median fitness.
         starts: starts to use instead, such as test:0-9 or validation:7.
         pose: one start to use instead: x [m], y [m] and heading [degrees].
-        robot: robot that drives.
+        robot: robot that drives; if not given, the one on wheels that all champions
+            were tested on, or else epuck.
         arena: arena to drive in; if not given, the one that the champion evolved in.
         robots: noise and differences of the robots; if not given, those that the
             champion evolved with.
@@ -44,7 +44,7 @@ class Options:
     trials: Annotated[int | None, word("N")] = None
     starts: Annotated[str | None, word("STARTS")] = None
     pose: Annotated[tuple[float, ...], word("X Y DEGREES")] = ()
-    robot: Annotated[str, word("ROBOT")] = WHEELED_ROBOT
+    robot: Annotated[str | None, word("ROBOT")] = None
     arena: Annotated[str | None, word("ARENA")] = None
     robots: ConditionFlags = field(default_factory=ConditionFlags)
     save: Annotated[Path | None, word("FILE")] = None

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from epuck_mj.scene.model_files import WHEELED_ROBOT
+from epuck_mj.scene.model_files import is_on_wheels
 from evolution.pages.words import robot_name
 from evolution.study.data import StudyData
 
@@ -20,7 +20,7 @@ def generator() -> np.random.Generator:
 
 def shown_robots(data: StudyData) -> tuple[str, ...]:
     """The robots in the order of every table: the one on wheels first."""
-    return tuple(sorted(data.robots, key=lambda robot: robot != WHEELED_ROBOT))
+    return tuple(sorted(data.robots, key=lambda robot: not is_on_wheels(robot)))
 
 
 def held_out_measure(robot: str) -> str:

@@ -15,6 +15,7 @@ import tyro
 from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import check_threads, main, parse, shell_command, word
 from epuck_mj.host.interruption import Interrupted, Interruption
+from epuck_mj.scene.model_files import on_wheels
 from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
 from evolution.run.progress import Progress
@@ -207,7 +208,9 @@ def _finished(run: "Run", live: bool, progress: Progress) -> Scores:
     from evolution.run.live import Live
 
     evolution = run.evolution
-    progress.begin(evolution.config.evaluations, evolution.evaluations)
+    config = evolution.config
+    wheels = on_wheels(config.robot)
+    progress.begin(config.evaluations, evolution.evaluations, wheels)
     with Live(evolution) if live else nullcontext() as view:
         for record in run.evolve():
             progress.update(record)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT
+from epuck_mj.scene.model_files import is_kinematic
 from evolution.judging.evaluation import Engine, evaluate
 from evolution.judging.held_out_starts import (
     held_out_disturbances,
@@ -122,7 +122,7 @@ def choose_champion(
     """
     config = evolution.config
     n = config.validation_starts
-    if config.robot == KINEMATIC_ROBOT:
+    if is_kinematic(config.robot):
         second = max(n, N_SCREENING)
         rounds = [(engine, n, SCREENED), (engine, second, config.finalists)]
         if config.has_finalists and wheels is not None:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from epuck_mj.host.files import writing
 from epuck_mj.host.own_parts import is_own
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT
+from epuck_mj.scene.model_files import is_kinematic
 from evolution.judging.held_out import Judges
 from evolution.judging.scores import Scores
 from evolution.run.directory import RunDirectory
@@ -29,9 +29,9 @@ def _notes(config: ExperimentConfig, judges: Judges) -> Iterator[str]:
     """Lines that somebody who waits for a run should know."""
     yield from judges.refusals(config.robot, config.setting)
     own = [name for name in (config.fitness, config.network) if is_own(name)]
-    if own and config.robot == KINEMATIC_ROBOT:
+    if own and is_kinematic(config.robot):
         yield (
-            f"{' and '.join(own)}: not compiled, so trials on {KINEMATIC_ROBOT} run "
+            f"{' and '.join(own)}: not compiled, so trials on {config.robot} run "
             "step by step, which is slower"
         )
 

@@ -12,7 +12,7 @@ import numpy as np
 from epuck_mj.errors import UserError
 from epuck_mj.scene.changed_robots import with_body_margin
 from epuck_mj.scene.model import Scene, load_scene
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
+from epuck_mj.scene.model_files import is_kinematic, on_wheels
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.disturbances import Disturbances
 from evolution.judging.evaluation import BatchEngine, DmControlEngine, Engine, evaluate
@@ -65,8 +65,8 @@ class Place:
         scene = load_scene(config.robot, config.arena, config.control_step)
         space, scenes = FreeSpace(scene, config.start_clearance), [scene]
         if config.climbs:
-            wheels = load_scene(WHEELED_ROBOT, config.arena, config.control_step)
-            scenes.append(wheels)
+            wheels = on_wheels(config.robot)
+            scenes.append(load_scene(wheels, config.arena, config.control_step))
         evolved = [with_body_margin(each, config.body_margin) for each in scenes]
         return cls(scene, space, tuple(evolved))
 
@@ -349,7 +349,7 @@ def make_engine(
         UserError: if there is none.
     """
     # dm_control steps MuJoCo: what is not simulated there has no other engine
-    if name == "batch" or (name in ENGINES and scene.name == KINEMATIC_ROBOT):
+    if name == "batch" or (name in ENGINES and is_kinematic(scene.name)):
         return BatchEngine(scene, config.task, threads)
     if name == "dm_control":
         if config.noise != "none":

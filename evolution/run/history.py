@@ -9,7 +9,7 @@ import numpy as np
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.scene.model_files import WHEELED_ROBOT
+from epuck_mj.scene.model_files import on_wheels
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def history_text(records: Sequence[Record], robot: str) -> str:
     rows = [
         ",".join([*(repr(getattr(record, name)) for name in HISTORY), name_of])
         for record in records
-        for name_of in [WHEELED_ROBOT if record.climbed else robot]
+        for name_of in [on_wheels(robot) if record.climbed else robot]
     ]
     return "\n".join([",".join([*HISTORY, ROBOT]), *rows]) + "\n"
 

@@ -21,7 +21,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import shell_command
 from epuck_mj.host.interruption import deaf_to_interrupts
 from epuck_mj.scene.model import load_scene
-from epuck_mj.scene.model_files import WHEELED_ROBOT
+from epuck_mj.scene.model_files import on_wheels
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.trials.recorder import record
 from evolution.judging.held_out_starts import (
@@ -140,9 +140,10 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
     from epuck_mj.show.recording.live import LiveView
 
     scene = load_scene(config.robot, config.arena, config.control_step)
-    on_wheels = scene
+    rolling = scene
     if config.climbs:
-        on_wheels = load_scene(WHEELED_ROBOT, config.arena, config.control_step)
+        wheels = on_wheels(config.robot)
+        rolling = load_scene(wheels, config.arena, config.control_step)
     start = starts_for_test(FreeSpace(scene, config.start_clearance), 1)[0]
     # as it evolves: what the first test start meets
     met = held_out_disturbances(config.conditions, Purpose.TEST, 1, config.steps)
@@ -160,7 +161,7 @@ def _follow(config: ExperimentConfig, port: int, generations: Any) -> None:
             if not np.array_equal(genomes[-1], shown):
                 shown = genomes[-1]
                 policy = config.topology.decode(shown)
-                driven = on_wheels if records[-1].climbed else scene
+                driven = rolling if records[-1].climbed else scene
                 trajectory = record(driven, policy, start, config.task, met)
                 view.trial(
                     records[-1].evaluations,

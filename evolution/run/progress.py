@@ -36,9 +36,15 @@ class Progress:
         if self._terminal:
             self._clock.start()
 
-    def begin(self, budget: int, done: int) -> None:
-        """Show the generations from now on, at `done` of `budget` evaluations."""
-        self._budget, self._next_line = budget, done
+    def begin(self, budget: int, done: int, wheels: str = WHEELED_ROBOT) -> None:
+        """Show the generations from now on, at `done` of `budget` evaluations.
+
+        Args:
+            budget: evaluations of the run.
+            done: evaluations so far.
+            wheels: robot that the run climbs to.
+        """
+        self._budget, self._next_line, self._wheels = budget, done, wheels
         self._replace_bar(total=budget, initial=done, unit="eval")
 
     def update(self, record: "Record") -> None:
@@ -50,7 +56,7 @@ class Progress:
             "crash": f"{record.crash_rate:.0%}",
         }
         if record.climbed:
-            figures["robot"] = WHEELED_ROBOT
+            figures["robot"] = self._wheels
         if self._terminal:
             self._bar.set_postfix(figures, refresh=False)
             self._bar.update(record.evaluations - self._bar.n)

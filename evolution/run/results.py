@@ -10,7 +10,7 @@ from epuck_mj.host import files
 from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.scene.changed_robots import with_body_margin
 from epuck_mj.scene.model import Scene
-from epuck_mj.scene.model_files import WHEELED_ROBOT
+from epuck_mj.scene.model_files import on_wheels
 from epuck_mj.step.control import BatchPolicy
 from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.trials.recorder import record_trajectories
@@ -78,7 +78,8 @@ def write_results(
     _draw_fitness(evolution, directory)
     tell("Recording the champion")
     text = scores.in_lines(config.task.most)
-    _show(evolution, directory, controller.controller, judges[WHEELED_ROBOT], text)
+    judge = judges[on_wheels(config.robot)]
+    _show(evolution, directory, controller.controller, judge, text)
     return scores
 
 
@@ -104,7 +105,8 @@ def judged(
     config, n = evolution.config, evolution.config.test_starts
     met = _met(config)
     tell(f"Choosing the champion on {config.validation_starts:,} fresh starts")
-    champion = _chosen(evolution, stored, judges[WHEELED_ROBOT].scene, threads)
+    wheels = on_wheels(config.robot)
+    champion = _chosen(evolution, stored, judges[wheels].scene, threads)
     policy = config.topology.decode(champion.genome)
     held_out, as_evolved = {}, {}
     for robot, judge in judges.items():
@@ -117,7 +119,7 @@ def judged(
     # what the run believed its best to be, and what that is worth where it evolved
     tell("Testing the individual of the highest fitness")
     genome, believed = best or most_believed(stored)
-    where = WHEELED_ROBOT if stored.climbed else Path(config.robot).name
+    where = wheels if stored.climbed else Path(config.robot).name
     worth = judges[where].fitness(config.topology, genome, n)
     scores = Scores(
         stored=champion.stored_fitness,
@@ -131,7 +133,7 @@ def judged(
 
 
 def _chosen(
-    evolution: Evolution, stored: Stored, on_wheels: Scene, threads: int
+    evolution: Evolution, stored: Stored, rolling: Scene, threads: int
 ) -> Champion:
     """The champion; its engines, of hundreds of megabytes, end with the choice."""
     config, wheels = evolution.config, None
@@ -140,7 +142,7 @@ def _chosen(
     scene = with_body_margin(evolution.scene, margin)
     engine = BatchEngine(scene, config.task, threads)
     if config.has_finalists:
-        scene = with_body_margin(on_wheels, margin)
+        scene = with_body_margin(rolling, margin)
         wheels = BatchEngine(scene, config.task, threads)
     return choose_champion(engine, evolution, stored, wheels)
 

@@ -20,7 +20,7 @@ from epuck_mj.host.limits import shown
 from epuck_mj.host.own_parts import is_own, located, own_part
 from epuck_mj.host.yaml_and_json import parse_yaml, to_yaml
 from epuck_mj.policies.topology import FEEDFORWARD, NETWORKS, OwnNetwork, Topology
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT, absolute
+from epuck_mj.scene.model_files import KINEMATIC_ROBOT, absolute, is_kinematic
 from epuck_mj.step.conditions import Conditions, NoiseLevel
 from epuck_mj.step.control import START_CLEARANCE, TaskParameters
 from evolution.search.table import SearchSpace, own_parameters
@@ -54,14 +54,16 @@ class ExperimentConfig(BaseModel):
     robot: Annotated[str, word("ROBOT")] = Field(
         KINEMATIC_ROBOT,
         description="epuck_kinematic (the robot on wheels without physics: hundreds "
-        "of times faster), epuck (on wheels in MuJoCo) or the path of an MJCF file",
+        "of times faster), epuck (on wheels in MuJoCo), epuck_cone_kinematic or "
+        "epuck_cone (the same two with sensors that see cones) or the path of an MJCF "
+        "file",
     )
     climb: Annotated[float, within("climb")] = Field(
         0.9,
-        description="share of the evaluations that are spent on epuck_kinematic; the "
-        "rest is spent on epuck, where the population is evaluated again, unless the "
-        "rest is too small for that; 1: all are spent on epuck_kinematic; without "
-        "effect on other robots",
+        description="share of the evaluations that are spent on a kinematic robot; the "
+        "rest is spent on the same robot on wheels, where the population is evaluated "
+        "again, unless the rest is too small for that; 1: all are spent on the "
+        "kinematic robot; without effect on other robots",
     )
     arena: Annotated[str, word("ARENA")] = Field(
         "arena", description="name of a shipped arena or the path of an MJCF file"
@@ -152,9 +154,9 @@ class ExperimentConfig(BaseModel):
     )
     finalists: Annotated[int, within("finalists")] = Field(
         5,
-        description="number of the best candidates on epuck_kinematic, among which the "
-        "champion is chosen on epuck; 0: the champion is the best on epuck_kinematic; "
-        "without effect on other robots",
+        description="number of the best candidates on a kinematic robot, among which "
+        "the champion is chosen on wheels; 0: the champion is the best on the "
+        "kinematic robot; without effect on other robots",
     )
     test_starts: Annotated[int, within("test_starts")] = Field(
         N_TEST,
@@ -172,12 +174,12 @@ class ExperimentConfig(BaseModel):
     @property
     def climbs(self) -> bool:
         """Whether a run goes on to wheels, if its budget suffices for that."""
-        return self.robot == KINEMATIC_ROBOT and self.climb < 1
+        return is_kinematic(self.robot) and self.climb < 1
 
     @property
     def has_finalists(self) -> bool:
-        """Whether the best on the kinematic robot are compared on wheels."""
-        return self.robot == KINEMATIC_ROBOT and self.finalists > 0
+        """Whether the best on a kinematic robot are compared on wheels."""
+        return is_kinematic(self.robot) and self.finalists > 0
 
     @property
     def conditions(self) -> Conditions:

@@ -12,7 +12,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.yaml_and_json import read_json
 from epuck_mj.policies.file import ControllerFile
 from epuck_mj.policies.wall_follower import YARDSTICK
-from epuck_mj.scene.model_files import WHEELED_ROBOT
+from epuck_mj.scene.model_files import is_on_wheels, on_wheels
 from evolution.judging.held_out import tested_on
 from evolution.judging.scores import HeldOut, KnownScores, Scores
 from evolution.run.directory import RunDirectory
@@ -93,6 +93,11 @@ class StudyData:
         first, last = self.robots[0], self.robots[-1]
         begun = {Path(config.robot).name for config in self.configs.values()}
         return (last, first) if last in begun else (first, last)
+
+    @property
+    def wheels(self) -> str:
+        """The shipped robot on wheels on which champions are reported."""
+        return on_wheels(next(iter(self.configs.values())).robot)
 
     @property
     def with_runs(self) -> dict[str, tuple[RunData, ...]]:
@@ -245,7 +250,7 @@ def _tested_on(config: ExperimentConfig, scores: Scores) -> tuple[str, ...]:
     """Names of the robots on which the first run has to be tested."""
     tests = tuple(scores.held_out)
     # champions of wheels were once tested on another robot besides, or on none
-    if config.robot == WHEELED_ROBOT and tests[0] == WHEELED_ROBOT:
+    if is_on_wheels(config.robot) and tests[0] == config.robot:
         return tests
     return tuple(Path(robot).name for robot in tested_on(config.robot))
 

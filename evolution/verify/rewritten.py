@@ -16,7 +16,7 @@ import numpy as np
 
 from epuck_mj.host.own_parts import is_own
 from epuck_mj.policies.file import CHAMPIONS
-from epuck_mj.scene.model_files import WHEELED_ROBOT
+from epuck_mj.scene.model_files import on_wheels
 from evolution.judging.evaluation import evaluate
 from evolution.judging.held_out import Judge, Judges
 from evolution.run.champion import Stored, stored_by
@@ -79,7 +79,7 @@ def compared(written: Written, judges: Judges, threads: int) -> Outcome:
     known = said(now, written.champion)
     lines += lines_of_differences(name, written.champion, known)
     if written.trajectory is not None:
-        policy, judge = controller.controller, tested[WHEELED_ROBOT]
+        policy, judge = controller.controller, tested[on_wheels(written.source.robot)]
         (shown,) = shown_trials(evolution, policy, judge, 1)
         name, before = written.run.trajectory.name, _arrays(written.trajectory)
         lines += lines_of_differences(name, before, _arrays(shown))
@@ -152,7 +152,8 @@ def _generations(
 
 def _robot(record: Record, evolution: Evolution) -> str:
     """Name of the robot of a generation."""
-    return WHEELED_ROBOT if record.climbed else evolution.scene.name
+    name = evolution.scene.name
+    return on_wheels(name) if record.climbed else name
 
 
 def _columns(records: list[Record]) -> dict[str, list[Any]]:

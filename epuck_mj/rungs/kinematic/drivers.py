@@ -19,7 +19,7 @@ from epuck_mj.policies.follower import (
 )
 from epuck_mj.policies.network import Controller
 from epuck_mj.rungs.kinematic.compiling import compiled
-from epuck_mj.rungs.kinematic.kernel import half_tanh
+from epuck_mj.rungs.kinematic.elementary import half_tanh
 
 
 class Drivers(NamedTuple):

@@ -104,6 +104,9 @@ class FusedTrials:
         bodies = Bodies.own(n)
         if disturbances is not None:
             reach, bodies = max(reach, PROXIMITY_REACH), disturbances.bodies
+        if self._scene.cosines.size:
+            # a cone counts all that its rays meet
+            reach = max(reach, PROXIMITY_REACH)
         plan = self._plan(reach, room_for(bodies))
         task = self._compiled_task(reach)
         states, own = at_rest(starts), own_numbers(plan, bodies, time)

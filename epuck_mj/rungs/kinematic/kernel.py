@@ -11,44 +11,14 @@ from math import sqrt
 import numpy as np
 
 from epuck_mj.rungs.kinematic.compiling import compiled
+from epuck_mj.rungs.kinematic.cones import widen
 from epuck_mj.rungs.kinematic.plan import Body, Grid, Plan
-from epuck_mj.step.elementary import (
-    EXP_MAX,
-    N_TABLE,
-    NEAREST,
-    PER_LN2,
-    POWERS,
-    ROOTS,
-    STEP_HIGH,
-    STEP_LOW,
-    TABLE_BITS,
-)
 
 # columns of a robot's state
 X, Y, YAW, COS, SIN, AHEAD, AROUND, N_STATE = range(8)
 
 # columns of a robot's own numbers
 LEFT_AHEAD, TIME_AHEAD, LEFT_AROUND, TIME_AROUND, RADIUS, OUTWARD, N_OWN = range(7)
-
-
-@compiled(forceinline=True)
-def exp(x):
-    """See `elementary.exp`."""
-    x = min(max(x, -EXP_MAX), EXP_MAX)
-    k = (x * PER_LN2 + NEAREST) - NEAREST
-    r = (x - k * STEP_HIGH) - k * STEP_LOW
-    square = r * r
-    high = 1 / 6 + r * (1 / 24 + r * (1 / 120))
-    series = r + square * (0.5 + r * high)
-    whole = np.int64(k)
-    root = ROOTS[whole & (N_TABLE - 1)]
-    return (root + root * series) * POWERS[(whole >> TABLE_BITS) + 1022]
-
-
-@compiled(forceinline=True)
-def half_tanh(x):
-    """See `elementary.half_tanh`."""
-    return 1.0 - 2.0 / (exp(x) + 1.0)
 
 
 @compiled(forceinline=True)
@@ -204,6 +174,53 @@ def rays_of(plan: Plan, own, i):
     return rays, plan.body.shell + max(outward, 0.0)
 
 
+@compiled()
+def aside_of(plan: Plan, own, i):
+    """Rays of robot `i` to the left and right of the others, `(4, 16)`; none `(4, 0)`.
+
+    A sensor moves with all of its rays.
+    """
+    outward = own[i, OUTWARD]
+    aside, n = plan.cones.rays.copy(), plan.rays.shape[1]
+    for k in range(aside.shape[1]):
+        aside[0, k] += outward * plan.rays[2, k % n]
+        aside[1, k] += outward * plan.rays[3, k % n]
+    return aside
+
+
+@compiled()
+def sense_aside(plan: Plan, aside, shell, reach, states, i, length, distance):
+    """Put what cones measure in the place of what their middle rays do [m].
+
+    Args:
+        plan: robot and arena.
+        aside: rays of robot `i`, as of `aside_of`.
+        shell: as of `rays_of`.
+        reach: farthest that rays have to see [m].
+        states: of all robots, `(n, N_STATE)`.
+        i: number of the robot.
+        length: room for the lengths of these rays, `(16,)`; changed.
+        distance: lengths of the middle rays, `(8,)`; changed.
+    """
+    grid, first, near, sides, ellipses = plan.seen
+    sense(
+        aside,
+        shell,
+        reach,
+        grid,
+        first,
+        near,
+        sides,
+        ellipses,
+        states[i, X],
+        states[i, Y],
+        states[i, COS],
+        states[i, SIN],
+        length,
+    )
+    widen(plan.cones.cosines, length, distance)
+
+
 @compiled(forceinline=True)
 def move(
     body: Body,
@@ -324,6 +341,8 @@ def sense_all(plan: Plan, states, own, reach, distance):
     """
     grid, first, near, sides, ellipses = plan.seen
     length = np.empty(plan.rays.shape[1])
+    n_aside = plan.cones.rays.shape[1]
+    beside = np.empty(n_aside)
     for i in range(states.shape[0]):
         rays, shell = rays_of(plan, own, i)
         sense(
@@ -341,5 +360,8 @@ def sense_all(plan: Plan, states, own, reach, distance):
             states[i, SIN],
             length,
         )
+        if n_aside > 0:
+            aside = aside_of(plan, own, i)
+            sense_aside(plan, aside, shell, reach, states, i, beside, length)
         for k in range(length.shape[0]):
             distance[i, k] = length[k]

@@ -14,7 +14,7 @@ from epuck_mj.constants import (
     STEP_RATE_MAX,
 )
 from epuck_mj.rungs.kinematic.compiling import compiled
-from epuck_mj.rungs.kinematic.kernel import exp
+from epuck_mj.rungs.kinematic.elementary import exp, interpolate
 from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.step.motors import STEP_ANGLE
 from epuck_mj.step.sensors import (
@@ -83,18 +83,6 @@ def noise_of(
         given.latency.astype(np.int64),
     )
     return noise, given.of.astype(np.int64)
-
-
-@compiled(forceinline=True)
-def interpolate(x, xs, ys):
-    """See `elementary.interpolate`."""
-    n = xs.shape[0]
-    x = min(max(x, xs[0]), xs[n - 1])
-    i = 0
-    while i < n - 2 and xs[i + 1] <= x:
-        i += 1
-    slope = (ys[i + 1] - ys[i]) / (xs[i + 1] - xs[i])
-    return ys[i] + (x - xs[i]) * slope
 
 
 @compiled(forceinline=True)

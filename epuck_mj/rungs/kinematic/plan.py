@@ -5,6 +5,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
 from epuck_mj.rungs.bodies import SPARE_SPEED
 from epuck_mj.rungs.kinematic.cut import UPRIGHT, NoOutline, Outlines, add_outline
@@ -82,12 +83,27 @@ class Walls(NamedTuple):
     ellipses: np.ndarray
 
 
+class Cones(NamedTuple):
+    """Rays to the left and to the right of those in the middle of sensors.
+
+    Attributes:
+        rays: as in `Plan`, all to the left, then all to the right, `(4, 16)`; `(4, 0)`
+            of sensors with one ray.
+        cosines: of the angles to the middle rays, `(8,)` or `(0,)`.
+    """
+
+    rays: np.ndarray
+    cosines: np.ndarray
+
+
 class Plan(NamedTuple):
     """Robot and arena.
 
     Attributes:
         body: numbers of the robot.
-        rays: origin x, y and direction x, y of each ray in the robot's frame, `(4, n)`.
+        rays: origin x, y and direction x, y of each sensor's ray, or of the one in its
+            middle, in the robot's frame, `(4, 8)`.
+        cones: further rays of the sensors.
         lag: time constants of forward and of turning speed [s], `(2,)`.
         massless: the same of a robot without mass, with its drives only, `(2,)`.
         seen: what rays see within their reach of the robot.
@@ -96,6 +112,7 @@ class Plan(NamedTuple):
 
     body: Body
     rays: np.ndarray
+    cones: Cones
     lag: np.ndarray
     massless: np.ndarray
     seen: Walls
@@ -117,11 +134,13 @@ def plan_of(
         UserError: if the robot or a geom of the arena cannot be put into a plan.
     """
     body, rays, lag, massless = _robot(scene)
+    cones = Cones(rays[:, N_PROXIMITY:].copy(), scene.cosines)
     # larger wheels turn faster, too
     way = SPARE_SPEED * control_step * body.speed_max * body.wheel_radius
     return Plan(
         body,
-        rays,
+        rays[:, :N_PROXIMITY].copy(),
+        cones,
         lag,
         massless,
         _walls(*_outlines(scene, False), body.shell + wider + reach),
@@ -151,8 +170,7 @@ def _robot(scene: Scene) -> tuple[Body, np.ndarray, np.ndarray, np.ndarray]:
     radius, track, lag, massless = _axle(scene)
     speed_max = float(model.actuator_ctrlrange[scene.wheels[0], 1])
     body = Body(float(shell.size[0]), radius, track, speed_max)
-    rays = np.hstack([origin[:, :2], direction[:, :2]]).T
-    return body, np.ascontiguousarray(rays), lag, massless
+    return body, np.hstack([origin[:, :2], direction[:, :2]]).T, lag, massless
 
 
 def _axle(scene: Scene) -> tuple[float, float, np.ndarray, np.ndarray]:

@@ -11,7 +11,17 @@ from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.rungs.bodies import SPARE_SPEED
 from epuck_mj.rungs.kinematic.compiling import compiled
 from epuck_mj.rungs.kinematic.drivers import Drivers, decide, notice
-from epuck_mj.rungs.kinematic.kernel import COS, SIN, X, Y, move, rays_of, sense
+from epuck_mj.rungs.kinematic.kernel import (
+    COS,
+    SIN,
+    X,
+    Y,
+    aside_of,
+    move,
+    rays_of,
+    sense,
+    sense_aside,
+)
 from epuck_mj.rungs.kinematic.noise import Noise, motor, sensed
 from epuck_mj.rungs.kinematic.plan import Plan
 from epuck_mj.step.fitness import SPACED_FAR, SPACED_NEAR
@@ -118,6 +128,9 @@ def trial(
     delay = noise.latency[which] if noise.there else task.late
     sent = np.zeros((delay + 1, 2))
     body, (rays, edge) = plan.body, rays_of(plan, own, i)
+    aside = aside_of(plan, own, i)
+    n_aside = aside.shape[1]
+    beside = np.empty(n_aside)
     limit = body.speed_max * (SPARE_SPEED if noise.there else 1.0)
     grid, first, near, sides, ellipses = plan.solid
     seen_grid, seen_first, seen_near, seen_sides, seen_ellipses = plan.seen
@@ -140,6 +153,8 @@ def trial(
         states[i, SIN],
         truth,
     )
+    if n_aside > 0:
+        sense_aside(plan, aside, edge, task.reach, states, i, beside, truth)
     if noise.there:
         for j in range(N_PROXIMITY):
             before[j] = -1.0 if truth[j] > PROXIMITY_REACH else truth[j]
@@ -210,6 +225,8 @@ def trial(
             states[i, SIN],
             truth,
         )
+        if n_aside > 0:
+            sense_aside(plan, aside, edge, task.reach, states, i, beside, truth)
         nearest = observe(truth, task.sensor_range, observation)
         close = 1.0 - nearest
         if noise.there:

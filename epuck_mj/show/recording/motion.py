@@ -3,7 +3,6 @@
 import numpy as np
 import rerun as rr
 
-from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.scene.geometry import kinematics, moving_bodies
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.robot_parts import ROBOT_BODY
@@ -53,7 +52,7 @@ def log_motion(
         colors=colors.reshape(-1, 3),
         radii=np.full(colors.size // 3, 0.001),
     )
-    counts = np.full(len(lines), N_PROXIMITY)
+    counts = np.full(len(lines), lines.shape[1])
     stream.send_columns(place.rays, now, ends.partition(counts))
 
     if trajectory.crashed:

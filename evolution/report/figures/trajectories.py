@@ -8,7 +8,6 @@ from matplotlib.collections import LineCollection, QuadMesh
 from matplotlib.figure import Figure
 
 from epuck_mj.scene.model import load_scene
-from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.show.figures import trajectory_figure
 from epuck_mj.trials.recorder import record
@@ -41,7 +40,7 @@ def trajectories_figure(data: StudyData) -> tuple[Figure, str]:
     runs = data.with_runs
     # one picture has one arena and one kind of fitness
     first = data.configs[next(iter(runs))]
-    scene = load_scene(WHEELED_ROBOT, first.arena, first.control_step)
+    scene = load_scene(data.wheels, first.arena, first.control_step)
     shown = [name for name in runs if _same_world(data.configs[name], first)]
     trials, titles, who = [], [], []
     for name in shown:
@@ -89,7 +88,7 @@ def _same_world(a: ExperimentConfig, b: ExperimentConfig) -> bool:
 
 def median_run(data: StudyData, name: str) -> RunData:
     """The run of median held-out fitness on the wheeled robot, the lower of two."""
-    robot = WHEELED_ROBOT if WHEELED_ROBOT in data.robots else data.robots[-1]
+    robot = data.wheels if data.wheels in data.robots else data.robots[-1]
     order = np.argsort(data.held_out(name, robot), kind="stable")
     return data.runs[name][order[(order.size - 1) // 2]]
 

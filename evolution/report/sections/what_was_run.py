@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
+from epuck_mj.scene.model_files import is_kinematic
 from evolution.pages.blocks import Block, Heading, Listing, Paragraph, Table
 from evolution.pages.words import (
     NOTHING,
@@ -115,12 +115,12 @@ def evolved_on(data: StudyData) -> str:
     text = f"the {robot_name(Path(config.robot).name)}"
     runs = [run for each in data.runs.values() for run in each]
     if any(run.history[CLIMBED].any() for run in runs):
-        text += f", then on the {robot_name(WHEELED_ROBOT)}"
+        text += f", then on the {robot_name(data.wheels)}"
     return text
 
 
 def _kinematic(data: StudyData) -> bool:
-    return next(iter(data.configs.values())).robot == KINEMATIC_ROBOT
+    return is_kinematic(next(iter(data.configs.values())).robot)
 
 
 def _candidates(data: StudyData) -> str:
@@ -136,7 +136,7 @@ def _finalists(data: StudyData) -> str:
     if numbers:
         text += (
             f", and the best {' or '.join(map(str, numbers))} of these are compared on "
-            f"the {robot_name(WHEELED_ROBOT)}"
+            f"the {robot_name(data.wheels)}"
         )
     return f"{text}."
 

@@ -14,7 +14,7 @@ import evolution
 from epuck_mj.errors import UserError
 from epuck_mj.host.own_parts import own_part
 from epuck_mj.scene.model import load_scene
-from epuck_mj.scene.model_files import WHEELED_ROBOT
+from epuck_mj.scene.model_files import on_wheels
 from evolution.settings.config import ExperimentConfig
 
 DECIDING = ("epuck-mj", "mujoco", "numpy", "scipy", "contourpy", "cmaes", "numba")
@@ -50,7 +50,7 @@ class Requirements:
         """
         facts = {package: version(package) for package in DECIDING}
         facts["code of epuck-mj"] = code()
-        for name in (robot, WHEELED_ROBOT):
+        for name in (robot, on_wheels(robot)):
             scene = load_scene(name, arena, control_step)
             for part, sha256 in scene.sha256.items():
                 facts[f"{part} of '{name}' in '{arena}'"] = sha256[:12]

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing
 
 from epuck_mj.scene.model import Scene, load_scene
-from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
+from epuck_mj.scene.model_files import is_kinematic, on_wheels
 from epuck_mj.step.control import TaskParameters, Trials
 from evolution.judging.evaluation import CAPACITY, BatchEngine, Engine, Work
 from evolution.run.means import Means
@@ -52,10 +52,11 @@ class ClusterEngines:
         Raises:
             UserError: as `requirements_of`.
         """
-        if scene.name == KINEMATIC_ROBOT:
+        if is_kinematic(scene.name):
             return BatchEngine(scene, self._config.task)
         # a run that has climbed is on another robot than it began with
-        robot = WHEELED_ROBOT if self._config.climbs else self._config.robot
+        robot = self._config.robot
+        robot = on_wheels(robot) if self._config.climbs else robot
         required = requirements_of(self._config, robot)
         return ClusterEngine(self._cluster, required, self._config.task)
 
