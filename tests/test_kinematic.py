@@ -25,10 +25,15 @@ from epuck_mj.rungs.kinematic.kernel import (
     X,
     Y,
     distance_to,
-    sense_all,
 )
-from epuck_mj.rungs.kinematic.plan import plan_of
-from epuck_mj.rungs.kinematic.robots import ENDLESS, KinematicRobots, at_rest, substeps
+from epuck_mj.rungs.kinematic.plan import Grid, plan_of
+from epuck_mj.rungs.kinematic.robots import (
+    ENDLESS,
+    KinematicRobots,
+    at_rest,
+    sensed,
+    substeps,
+)
 from epuck_mj.rungs.kinematic.whole_trial import FITNESS
 from epuck_mj.rungs.mujoco_batch import MujocoRobots
 from epuck_mj.rungs.table import compiled_trials, robots_in
@@ -247,19 +252,19 @@ def test_rays_and_clearance_are_mujoco_s(tmp_path, seed):
     assert (found.distance < 0).any()
     assert not found.contact.any()
     # whatever a grid leaves out is out of reach
-    near = np.empty_like(found.distance)
     plan = plan_of(scene, 0.04, 0.1)
     own = np.zeros((len(poses), N_OWN))
-    sense_all(plan, at_rest(poses), own, 0.04, near)
+    near = sensed(plan, at_rest(poses), own, 0.04)
     seen = (found.distance >= 0) & (found.distance <= 0.04)
     np.testing.assert_array_equal(near, np.where(seen, found.distance, -1))
     plan = plan_of(scene, ENDLESS, 0.1)
     states = at_rest(poses)
-    _, *walls = plan.solid._replace(
+    walls = plan.solid._replace(
+        grid=Grid(0.0, 0.0, 1.0, 0, 0),
         first=np.array([0, len(plan.solid.sides) + len(plan.solid.ellipses)]),
         near=np.arange(len(plan.solid.sides) + len(plan.solid.ellipses)),
     )
-    own = [distance_to(*walls, 0, s[X], s[Y]) - plan.body.shell for s in states]
+    own = [distance_to(walls, 0, s[X], s[Y]) - plan.body.shell for s in states]
     close = clearance < CLEARANCE_MAX
     # a lean box is nearer below or above the shell than where the shell can touch it
     off = np.array(own)[close] - clearance[close]

@@ -23,10 +23,10 @@ from epuck_mj.calibrate.parameters import (
     track,
 )
 from epuck_mj.calibrate.recorded_drive import RecordedDrive
-from epuck_mj.constants import N_PROXIMITY, PROXIMITY_PERIOD, TRACK, WHEEL_RADIUS
-from epuck_mj.rungs.kinematic.kernel import N_OWN, sense_all
+from epuck_mj.constants import PROXIMITY_PERIOD, TRACK, WHEEL_RADIUS
+from epuck_mj.rungs.kinematic.kernel import N_OWN
 from epuck_mj.rungs.kinematic.plan import Plan
-from epuck_mj.rungs.kinematic.robots import at_rest
+from epuck_mj.rungs.kinematic.robots import at_rest, sensed
 from epuck_mj.step.motors import STEP_ANGLE
 from epuck_mj.step.sensors import (
     LOG_COUNTS,
@@ -210,10 +210,9 @@ class DriveModel:
 
     def distances(self, poses: np.ndarray) -> np.ndarray:
         """Length of each ray from poses `(n, 3)`, at most SIGHT [m], `(n, 8)`."""
-        found = np.empty((len(poses), N_PROXIMITY))
         # sensors are where the plan has them
         own = np.zeros((len(poses), N_OWN))
-        sense_all(self.plan, at_rest(poses), own, SIGHT, found)
+        found = sensed(self.plan, at_rest(poses), own, SIGHT)
         return np.where(found < 0, SIGHT, found)
 
     def linearised(self, poses: np.ndarray, parameters: np.ndarray) -> Linearised:

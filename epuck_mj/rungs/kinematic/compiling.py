@@ -114,8 +114,14 @@ def _forgiving(cache: Any) -> None:
 
 def compiled(**options: Any) -> Callable[[Any], Any]:
     """Decorator that compiles a function at its first call."""
-    # division by 0 gives infinity, as in numpy: a check at each would cost much
-    options |= {"nogil": True, "error_model": "numpy", "cache": bool(FOLDERS)}
+    options |= {
+        "nogil": True,
+        # division by 0 gives infinity, as in numpy: a check at each would cost much
+        "error_model": "numpy",
+        # nothing is allocated: else numba counts who uses each array, at each call
+        "_nrt": False,
+        "cache": bool(FOLDERS),
+    }
 
     def decorate(function: Any) -> Any:
         before = config.CACHE_DIR

@@ -26,6 +26,7 @@ from epuck_mj.rungs.kinematic.whole_trial import (
     NOTHING_TRIED,
     Exploration,
     Task,
+    room_for_a_trial,
     trials,
 )
 from epuck_mj.scene.model import Scene
@@ -129,6 +130,7 @@ class FusedTrials:
                 fitness,
                 steps,
                 crashed,
+                room_for_a_trial(plan, task, noise, drivers),
             )
 
         parts = _parts(n // per_individual, self._threads)

@@ -7,12 +7,13 @@ processor gives the same bits.
 """
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from epuck_mj.rungs.kinematic.compiling import compiled
 from epuck_mj.rungs.kinematic.cones import widen
-from epuck_mj.rungs.kinematic.plan import Body, Grid, Plan
+from epuck_mj.rungs.kinematic.plan import Body, Grid, Plan, Walls
 
 # columns of a robot's state
 X, Y, YAW, COS, SIN, AHEAD, AROUND, N_STATE = range(8)
@@ -78,15 +79,15 @@ def ellipse_distance(ellipses, i, x, y):
 
 
 @compiled(forceinline=True)
-def distance_to(first, near, sides, ellipses, cell, x, y):
+def distance_to(walls: Walls, cell, x, y):
     """Distance of a place from the outlines near its cell [m]; infinite without any."""
-    least, n = np.inf, sides.shape[0]
-    for k in range(first[cell], first[cell + 1]):
-        i = near[k]
+    least, n = np.inf, walls.sides.shape[0]
+    for k in range(walls.first[cell], walls.first[cell + 1]):
+        i = walls.near[k]
         if i < n:
-            square = side_distance(sides, i, x, y)
+            square = side_distance(walls.sides, i, x, y)
         else:
-            square = ellipse_distance(ellipses, i - n, x, y)
+            square = ellipse_distance(walls.ellipses, i - n, x, y)
         least = square if square < least else least
     return sqrt(least)
 
@@ -142,110 +143,93 @@ def cast_at_ellipse(rays, ellipses, i, x, y, cos, sin, length):
 
 
 @compiled(forceinline=True)
-def sense(
-    rays, shell, reach, grid: Grid, first, near, sides, ellipses, x, y, cos, sin, length
-):
-    """Lengths of a robot's rays `(n,)` [m]; -1 where nothing is within reach."""
-    n, far = sides.shape[0], shell + reach
+def cast(rays, edge, reach, walls: Walls, state, i, length):
+    """Lengths of rays `(n,)` of robot `i` [m]; -1 where nothing is within reach."""
+    x, y, cos, sin = state[i, X], state[i, Y], state[i, COS], state[i, SIN]
+    n, far = walls.sides.shape[0], edge + reach
     for k in range(length.shape[0]):
         length[k] = np.inf
-    cell = cell_of(grid, x, y)
-    for m in range(first[cell], first[cell + 1]):
-        i = near[m]
-        if i >= n:
-            cast_at_ellipse(rays, ellipses, i - n, x, y, cos, sin, length)
-        elif side_distance(sides, i, x, y) <= far * far:
-            cast_at_side(rays, sides, i, x, y, cos, sin, length)
+    cell = cell_of(walls.grid, x, y)
+    for m in range(walls.first[cell], walls.first[cell + 1]):
+        j = walls.near[m]
+        if j >= n:
+            cast_at_ellipse(rays, walls.ellipses, j - n, x, y, cos, sin, length)
+        elif side_distance(walls.sides, j, x, y) <= far * far:
+            cast_at_side(rays, walls.sides, j, x, y, cos, sin, length)
     for k in range(length.shape[0]):
         length[k] = -1.0 if length[k] > reach else length[k]
 
 
+class Rays(NamedTuple):
+    """Room for the rays of one robot.
+
+    Attributes:
+        middle: origin x, y and direction x, y in its frame, `(4, 8)`.
+        aside: likewise those to the left of them, then to the right, `(4, 16)`;
+            `(4, 0)` of a robot with one ray a sensor.
+        length: of the rays aside [m], `(16,)` or `(0,)`.
+    """
+
+    middle: np.ndarray
+    aside: np.ndarray
+    length: np.ndarray
+
+
+def room_for_rays(plan: Plan) -> Rays:
+    """Room for the rays of a robot of this plan."""
+    shape = plan.cones.rays.shape
+    return Rays(np.empty(plan.rays.shape), np.empty(shape), np.empty(shape[1]))
+
+
 @compiled(forceinline=True)
-def rays_of(plan: Plan, own, i):
-    """Rays of robot `i`, `(4, n)`, whose sensors may be elsewhere; and their reach.
+def place_rays(plan: Plan, own, i, rays: Rays):
+    """Put the rays of robot `i`, whose sensors may be elsewhere, into their room.
 
-    Nothing is farther from the axle than the second number where a ray begins [m].
+    Returns:
+        How far from the axle a ray begins at most [m].
     """
     outward = own[i, OUTWARD]
-    rays = plan.rays.copy()
-    for k in range(rays.shape[1]):
-        rays[0, k] += outward * rays[2, k]
-        rays[1, k] += outward * rays[3, k]
-    return rays, plan.body.shell + max(outward, 0.0)
-
-
-@compiled()
-def aside_of(plan: Plan, own, i):
-    """Rays of robot `i` to the left and right of the others, `(4, 16)`; none `(4, 0)`.
-
-    A sensor moves with all of its rays.
-    """
-    outward = own[i, OUTWARD]
-    aside, n = plan.cones.rays.copy(), plan.rays.shape[1]
+    n, middle, aside = plan.rays.shape[1], rays.middle, rays.aside
+    for k in range(n):
+        for row in range(4):
+            middle[row, k] = plan.rays[row, k]
+        middle[0, k] += outward * plan.rays[2, k]
+        middle[1, k] += outward * plan.rays[3, k]
+    # a sensor moves with all of its rays
     for k in range(aside.shape[1]):
+        for row in range(4):
+            aside[row, k] = plan.cones.rays[row, k]
         aside[0, k] += outward * plan.rays[2, k % n]
         aside[1, k] += outward * plan.rays[3, k % n]
-    return aside
+    return plan.body.shell + max(outward, 0.0)
 
 
-@compiled()
-def sense_aside(plan: Plan, aside, shell, reach, states, i, length, distance):
-    """Put what cones measure in the place of what their middle rays do [m].
+@compiled(forceinline=True)
+def sense(plan: Plan, rays: Rays, edge, reach, state, i, distance):
+    """What robot `i` senses where it stands.
 
     Args:
         plan: robot and arena.
-        aside: rays of robot `i`, as of `aside_of`.
-        shell: as of `rays_of`.
+        rays: of this robot.
+        edge: how far from the axle they begin at most [m].
         reach: farthest that rays have to see [m].
-        states: of all robots, `(n, N_STATE)`.
+        state: of all robots, `(n, N_STATE)`.
         i: number of the robot.
-        length: room for the lengths of these rays, `(16,)`; changed.
-        distance: lengths of the middle rays, `(8,)`; changed.
+        distance: of what each sensor sees [m], -1 if nothing, `(8,)`; filled.
     """
-    grid, first, near, sides, ellipses = plan.seen
-    sense(
-        aside,
-        shell,
-        reach,
-        grid,
-        first,
-        near,
-        sides,
-        ellipses,
-        states[i, X],
-        states[i, Y],
-        states[i, COS],
-        states[i, SIN],
-        length,
-    )
-    widen(plan.cones.cosines, length, distance)
+    cast(rays.middle, edge, reach, plan.seen, state, i, distance)
+    if rays.length.shape[0] > 0:
+        cast(rays.aside, edge, reach, plan.seen, state, i, rays.length)
+        widen(plan.cones.cosines, rays.length, distance)
 
 
 @compiled(forceinline=True)
-def move(
-    body: Body,
-    grid: Grid,
-    first,
-    near,
-    sides,
-    ellipses,
-    state,
-    i,
-    own,
-    left,
-    right,
-    n_substeps,
-    substep,
-):
+def move(body: Body, walls: Walls, state, i, own, left, right, n_substeps, substep):
     """Move robot `i` for a control step; whether its shell touched a wall.
 
     Args:
         body: numbers of the robot.
-        grid: of what its shell can touch; see `Walls`.
-        first: likewise.
-        near: likewise.
-        sides: likewise.
-        ellipses: likewise.
+        walls: that its shell can touch.
         state: of all robots, `(n, N_STATE)`; changed.
         i: number of the robot.
         own: numbers of all robots, `(n, N_OWN)`; see `robots.own_numbers`.
@@ -261,9 +245,9 @@ def move(
     left_ahead, time_ahead = own[i, LEFT_AHEAD], own[i, TIME_AHEAD]
     left_around, time_around = own[i, LEFT_AROUND], own[i, TIME_AROUND]
     radius = own[i, RADIUS]
-    cell, touched = cell_of(grid, x, y), False
+    cell, touched = cell_of(walls.grid, x, y), False
     # how far it can go before it may touch anything
-    free = distance_to(first, near, sides, ellipses, cell, x, y) - radius
+    free = distance_to(walls, cell, x, y) - radius
     for _ in range(n_substeps):
         way = body.wheel_radius * (ahead * substep + (u - ahead) * time_ahead)
         angle = turn * (around * substep + (w - around) * time_around)
@@ -282,7 +266,7 @@ def move(
         yaw += angle
         free -= abs(way)
         if free <= ROUNDING:
-            free = distance_to(first, near, sides, ellipses, cell, x, y) - radius
+            free = distance_to(walls, cell, x, y) - radius
             if free <= 0.0:
                 touched = True
                 break
@@ -298,70 +282,34 @@ ROUNDING = 1e-12
 
 
 @compiled()
-def step_all(
-    plan: Plan, states, own, commands, n_substeps, substep, reach, distance, contact
-):
-    """One control step of robots `(n, N_STATE)`; fills `(n, 8)` and `(n,)`."""
-    grid, first, near, sides, ellipses = plan.solid
+def step_all(plan: Plan, rays: Rays, states, own, commands, time, reach, seen, contact):
+    """One control step of robots `(n, N_STATE)`; fills `(n, 8)` and `(n,)`.
+
+    `time` is the number of substeps and the duration of one [s].
+    """
     for i in range(states.shape[0]):
+        left, right = commands[i, 0], commands[i, 1]
         contact[i] = move(
-            plan.body,
-            grid,
-            first,
-            near,
-            sides,
-            ellipses,
-            states,
-            i,
-            own,
-            commands[i, 0],
-            commands[i, 1],
-            n_substeps,
-            substep,
+            plan.body, plan.solid, states, i, own, left, right, time[0], time[1]
         )
-    sense_all(plan, states, own, reach, distance)
+    sense_all(plan, rays, states, own, reach, seen)
 
 
 @compiled()
 def touch_all(plan: Plan, states, own, contact):
     """Whether robots `(n, N_STATE)` touch a wall where they stand; fills `(n,)`."""
-    grid, first, near, sides, ellipses = plan.solid
     for i in range(states.shape[0]):
         x, y = states[i, X], states[i, Y]
-        cell = cell_of(grid, x, y)
-        far = distance_to(first, near, sides, ellipses, cell, x, y)
+        far = distance_to(plan.solid, cell_of(plan.solid.grid, x, y), x, y)
         contact[i] = far <= own[i, RADIUS]
 
 
 @compiled()
-def sense_all(plan: Plan, states, own, reach, distance):
+def sense_all(plan: Plan, rays: Rays, states, own, reach, seen):
     """What robots `(n, N_STATE)` sense where they stand; fills `(n, 8)`.
 
     Of their own numbers `(n, N_OWN)` only OUTWARD counts.
     """
-    grid, first, near, sides, ellipses = plan.seen
-    length = np.empty(plan.rays.shape[1])
-    n_aside = plan.cones.rays.shape[1]
-    beside = np.empty(n_aside)
     for i in range(states.shape[0]):
-        rays, shell = rays_of(plan, own, i)
-        sense(
-            rays,
-            shell,
-            reach,
-            grid,
-            first,
-            near,
-            sides,
-            ellipses,
-            states[i, X],
-            states[i, Y],
-            states[i, COS],
-            states[i, SIN],
-            length,
-        )
-        if n_aside > 0:
-            aside = aside_of(plan, own, i)
-            sense_aside(plan, aside, shell, reach, states, i, beside, length)
-        for k in range(length.shape[0]):
-            distance[i, k] = length[k]
+        edge = place_rays(plan, own, i, rays)
+        sense(plan, rays, edge, reach, states, i, seen[i])

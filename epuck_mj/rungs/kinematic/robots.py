@@ -19,6 +19,7 @@ from epuck_mj.rungs.kinematic.kernel import (
     TIME_AROUND,
     YAW,
     X,
+    room_for_rays,
     sense_all,
     step_all,
     touch_all,
@@ -55,6 +56,7 @@ class KinematicRobots:
         self._threads = threads
         self._time = scene.n_substeps * scene.model.opt.timestep
         self._plan = plan_of(scene, ENDLESS, self._time)
+        self._rays = room_for_rays(self._plan)
         self._bodies, self._room = Bodies.own(capacity), 0.0
         self._spare = 1.0
         self._states = np.zeros((0, N_STATE))
@@ -71,12 +73,9 @@ class KinematicRobots:
                 f"expected at most {self.capacity} starts, got {len(starts)}"
             )
         self._states = at_rest(starts)
-        n = len(starts)
-        self._numbers = own_numbers(self._plan, self._bodies[:n], self._time)
-        distance, contact = _empty(n)
-        touch_all(self._plan, self._states, self._numbers, contact)
-        sense_all(self._plan, self._states, self._numbers, ENDLESS, distance)
-        return Reading(distance, contact)
+        bodies = self._bodies[: len(starts)]
+        self._numbers = own_numbers(self._plan, bodies, self._time)
+        return self._read(self._states, self._numbers)
 
     def step(self, command: np.ndarray) -> Reading:
         """Drive the active robots for one control step.
@@ -87,13 +86,15 @@ class KinematicRobots:
             command: wheel speeds [rad/s], `(active, 2)`.
         """
         most = self._plan.body.speed_max * self._spare
-        distance, contact = _empty(len(self._states))
+        distance = np.empty((len(self._states), N_PROXIMITY))
+        contact = np.empty(len(self._states), bool)
         step_all(
             self._plan,
+            self._rays,
             self._states,
             self._numbers,
             np.clip(command, -most, most),
-            *substeps(self._time),
+            substeps(self._time),
             ENDLESS,
             distance,
             contact,
@@ -106,10 +107,7 @@ class KinematicRobots:
         self._states[which] = states
         own = own_numbers(self._plan, self._bodies[which], self._time)
         self._numbers[which] = own
-        distance, contact = _empty(len(states))
-        touch_all(self._plan, states, own, contact)
-        sense_all(self._plan, states, own, ENDLESS, distance)
-        return Reading(distance, contact)
+        return self._read(states, own)
 
     def keep(self, mask: np.ndarray) -> None:
         """Keep only the active robots that `mask` `(active,)` selects."""
@@ -138,15 +136,30 @@ class KinematicRobots:
         """See `Simulator.disembody`."""
         self._bodies, self._spare = Bodies.own(self.capacity), 1.0
 
+    def _read(self, states: np.ndarray, own: np.ndarray) -> Reading:
+        """Reading of robots where they stand."""
+        contact = np.empty(len(states), bool)
+        touch_all(self._plan, states, own, contact)
+        return Reading(sensed(self._plan, states, own, ENDLESS), contact)
+
     @cached_property
     def _probe(self) -> ClearanceProbe:
         """Clearance probe, made at its first use."""
         return ClearanceProbe(self.scene, self._threads)
 
 
-def _empty(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Distances and contacts of a reading of `n` robots, to be filled."""
-    return np.empty((n, N_PROXIMITY)), np.empty(n, bool)
+def sensed(plan: Plan, states: np.ndarray, own: np.ndarray, reach: float) -> np.ndarray:
+    """Distances that robots sense where they stand [m], `(n, 8)`; -1 if nothing.
+
+    Args:
+        plan: robot and arena.
+        states: of the robots, `(n, N_STATE)`.
+        own: numbers of their bodies, `(n, N_OWN)`; only OUTWARD counts.
+        reach: farthest that rays have to see [m].
+    """
+    distance = np.empty((len(states), N_PROXIMITY))
+    sense_all(plan, room_for_rays(plan), states, own, reach, distance)
+    return distance
 
 
 def at_rest(starts: np.ndarray) -> np.ndarray:

@@ -12,15 +12,11 @@ from epuck_mj.rungs.bodies import SPARE_SPEED
 from epuck_mj.rungs.kinematic.compiling import compiled
 from epuck_mj.rungs.kinematic.drivers import Drivers, decide, notice
 from epuck_mj.rungs.kinematic.kernel import (
-    COS,
-    SIN,
-    X,
-    Y,
-    aside_of,
+    Rays,
     move,
-    rays_of,
+    place_rays,
+    room_for_rays,
     sense,
-    sense_aside,
 )
 from epuck_mj.rungs.kinematic.noise import Noise, motor, sensed
 from epuck_mj.rungs.kinematic.plan import Plan
@@ -82,6 +78,46 @@ NOTHING_TRIED = Exploration(
 )
 
 
+class Room(NamedTuple):
+    """Room for what a trial needs while it lasts; one trial after the other uses it.
+
+    Attributes:
+        rays: of the robot.
+        truth: distance that each sensor sees [m], `(8,)`.
+        before: the same one control step earlier, `(8,)`.
+        distance: what disturbed sensors say, `(8,)`.
+        last: observation of the last control step, `(8,)`.
+        observation: inputs of the policy; changes of readings come last.
+        neurons: outputs of the hidden neurons.
+        sent: commands that have not reached the wheels, `(control steps, 2)`.
+    """
+
+    rays: Rays
+    truth: np.ndarray
+    before: np.ndarray
+    distance: np.ndarray
+    last: np.ndarray
+    observation: np.ndarray
+    neurons: np.ndarray
+    sent: np.ndarray
+
+
+def room_for_a_trial(plan: Plan, task: Task, noise: Noise, drivers: Drivers) -> Room:
+    """Room for any of these trials."""
+    delay = int(noise.latency.max()) if noise.there else task.late
+    truth, before, distance, last = np.empty((4, N_PROXIMITY))
+    return Room(
+        room_for_rays(plan),
+        truth,
+        before,
+        distance,
+        last,
+        np.empty(drivers.inputs),
+        np.empty(drivers.hidden.shape[2]),
+        np.empty((delay + 1, 2)),
+    )
+
+
 @compiled(forceinline=True)
 def observe(distance, sensor_range, observation):
     """See `sensors.observe`; fills `(8,)`, the least of them."""
@@ -105,6 +141,7 @@ def trial(
     states,
     own,
     needed,
+    room: Room,
 ):
     """One trial: fitness, control steps, whether it crashed.
 
@@ -119,42 +156,19 @@ def trial(
         states: of all robots on their starts, `(n, N_STATE)`; changed.
         own: numbers of their bodies, `(n, N_OWN)`.
         needed: fitness that it has to reach to matter; the trial ends when it cannot.
+        room: for what it needs while it lasts.
     """
-    truth, before = np.empty(N_PROXIMITY), np.empty(N_PROXIMITY)
-    distance, last = np.empty(N_PROXIMITY), np.empty(N_PROXIMITY)
-    # of some policies, the changes of the readings come behind them
-    observation = np.empty(drivers.inputs)
-    neurons = np.empty(drivers.hidden.shape[2])
+    rays, truth, before, distance, last, observation, neurons, sent = room
     delay = noise.latency[which] if noise.there else task.late
-    sent = np.zeros((delay + 1, 2))
-    body, (rays, edge) = plan.body, rays_of(plan, own, i)
-    aside = aside_of(plan, own, i)
-    n_aside = aside.shape[1]
-    beside = np.empty(n_aside)
-    limit = body.speed_max * (SPARE_SPEED if noise.there else 1.0)
-    grid, first, near, sides, ellipses = plan.solid
-    seen_grid, seen_first, seen_near, seen_sides, seen_ellipses = plan.seen
+    for k in range(delay + 1):
+        sent[k, 0] = sent[k, 1] = 0.0
+    edge = place_rays(plan, own, i, rays)
+    limit = plan.body.speed_max * (SPARE_SPEED if noise.there else 1.0)
     gains, share, count_noise = noise.gains, noise.share, noise.count_noise
     table = noise.tables[noise.table[which]]
     wheel_gains, wheel_noise = noise.wheel_gains, noise.wheel_noise
     turn_gain = noise.turn_gain[which]
-    sense(
-        rays,
-        edge,
-        task.reach,
-        seen_grid,
-        seen_first,
-        seen_near,
-        seen_sides,
-        seen_ellipses,
-        states[i, X],
-        states[i, Y],
-        states[i, COS],
-        states[i, SIN],
-        truth,
-    )
-    if n_aside > 0:
-        sense_aside(plan, aside, edge, task.reach, states, i, beside, truth)
+    sense(plan, rays, edge, task.reach, states, i, truth)
     if noise.there:
         for j in range(N_PROXIMITY):
             before[j] = -1.0 if truth[j] > PROXIMITY_REACH else truth[j]
@@ -193,40 +207,10 @@ def trial(
             place = (k + 1) % (delay + 1)
             left, right = sent[place, 0], sent[place, 1]
         left, right = min(max(left, -limit), limit), min(max(right, -limit), limit)
-        crashed = move(
-            body,
-            grid,
-            first,
-            near,
-            sides,
-            ellipses,
-            states,
-            i,
-            own,
-            left,
-            right,
-            task.n_substeps,
-            task.substep,
-        )
-        if crashed:
+        n, time = task.n_substeps, task.substep
+        if move(plan.body, plan.solid, states, i, own, left, right, n, time):
             return fitness, k + 1, True
-        sense(
-            rays,
-            edge,
-            task.reach,
-            seen_grid,
-            seen_first,
-            seen_near,
-            seen_sides,
-            seen_ellipses,
-            states[i, X],
-            states[i, Y],
-            states[i, COS],
-            states[i, SIN],
-            truth,
-        )
-        if n_aside > 0:
-            sense_aside(plan, aside, edge, task.reach, states, i, beside, truth)
+        sense(plan, rays, edge, task.reach, states, i, truth)
         nearest = observe(truth, task.sensor_range, observation)
         close = 1.0 - nearest
         if noise.there:
@@ -267,6 +251,7 @@ def trials(
     fitness,
     steps,
     crashed,
+    room: Room,
 ):
     """Trials of the individuals from `first` to `last`; fills what came of them.
 
@@ -286,6 +271,7 @@ def trials(
         fitness: of each trial, `(n,)`.
         steps: control steps of each trial, `(n,)`.
         crashed: whether it crashed, `(n,)`.
+        room: for what a trial needs while it lasts.
     """
     for individual in range(first, last):
         total = 0.0
@@ -305,6 +291,7 @@ def trials(
                 states,
                 own,
                 needed,
+                room,
             )
             total += fitness[i]
             if total + rest < to_beat[individual]:
