@@ -11,7 +11,7 @@ PAPERS := de-best de-rand ga
 ROBUST := 1 2 3 4 5 6 7 8 9 10
 NETWORKS := robust-feedforward-changes robust-feedforward
 
-.PHONY: run test docs docs-serve bench ladder convergence racing overhead recording bridge ppo gap results figures clean
+.PHONY: run test docs docs-serve bench ladder convergence racing overhead recording bridge fleet ppo gap results figures clean
 
 run: $(INSTALLED)
 	@if [ -f $(RUN)/config.yaml ]; then \
@@ -59,6 +59,10 @@ recording: $(INSTALLED)
 # the bridge against the emulated robot, two minutes in real time; wants an idle machine
 bridge: $(INSTALLED)
 	$(BIN)/python -m benchmarks.bridge --json results/bridge.json
+
+# ten robots at once against ten emulated ones, a minute in real time; likewise
+fleet: $(INSTALLED)
+	$(BIN)/python -m benchmarks.fleet --json results/fleet.json
 
 # PPO beside DE/best: 15 minutes; needs the extra ppo, which is not in dev
 ppo: $(INSTALLED)
