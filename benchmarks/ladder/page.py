@@ -77,7 +77,7 @@ def write_page(
     for arena, columns in measured.items():
         tried = [each for each in controllers if each.name in columns[REFERENCE]]
         lines += ["", f"## {arena}", "", *_differences(columns, tried)]
-        lines += ["", *_named(columns, tried)]
+        lines += ["", *_by_experiment(columns, tried), "", *_named(columns, tried)]
     with files.writing():
         files.write_text(path, "\n".join(lines) + "\n")
 
@@ -85,9 +85,9 @@ def write_page(
 def _differences(columns: Mapping[str, Column], tried: Sequence[Tried]) -> list[str]:
     """How far each rung is from the reference, by sets of controllers."""
     lines = [
-        "| robot | controllers | n | mean difference | bias | largest | "
-        "rank correlation | differ by more than 5 % |",
-        "|---|---|---:|---:|---:|---:|---:|---:|",
+        "| robot | controllers | n | mean difference | median difference | bias | "
+        "largest | rank correlation | differ by more than 5 % |",
+        "|---|---|---:|---:|---:|---:|---:|---:|---:|",
     ]
     for name, column in columns.items():
         if name == REFERENCE:
@@ -102,9 +102,35 @@ def _differences(columns: Mapping[str, Column], tried: Sequence[Tried]) -> list[
             rho = rank_correlation(seen, true)
             lines.append(
                 f"| {name} | {title} | {len(names)} | {np.abs(off).mean():.1f} | "
+                f"{np.median(np.abs(off)):.1f} | "
                 f"{off.mean():+.1f} | {off[np.abs(off).argmax()]:+.1f} | "
                 f"{'' if rho is None else f'{rho:.3f}'} | {_many(off, true).sum()} |"
             )
+    return lines
+
+
+def _by_experiment(columns: Mapping[str, Column], tried: Sequence[Tried]) -> list[str]:
+    """Mean differences from the reference of the champions of each experiment."""
+    members: dict[str, list[str]] = {}
+    for each in tried:
+        if each.kind == CHAMPION:
+            members.setdefault(each.name.rpartition("/")[0], []).append(each.name)
+    rungs = [name for name in columns if name != REFERENCE]
+    lines = [
+        "Champions by experiment: median fitness on the reference, and mean size of "
+        "the differences from it.",
+        "",
+        f"| experiment | n | {REFERENCE} | {' | '.join(rungs)} |",
+        "|---|---:|---:|" + "---:|" * len(rungs),
+    ]
+    for experiment, names in members.items():
+        true = np.array([columns[REFERENCE][name][0] for name in names])
+        off = (
+            np.abs(np.array([columns[rung][name][0] for name in names]) - true).mean()
+            for rung in rungs
+        )
+        cells = [experiment, str(len(names)), f"{np.median(true):.0f}"]
+        lines.append(f"| {' | '.join([*cells, *(f'{each:.1f}' for each in off)])} |")
     return lines
 
 
@@ -169,9 +195,9 @@ kinematic robot alone. In arenas other than the square, every third controller h
 quarter of these starts. Sensors are ideal. Fitness is of 300.
 
 Differences are those of a controller's mean fitness on the robot from that on the
-reference: their mean size, their mean (bias), and the largest. Those below 3 do not
-count as more than 5 %, as poor controllers have little fitness. *epuck, touches at the
-end* is the robot on wheels when only those touches are crashes that last to the end of
-a control step.
+reference: their mean and median size, their mean (bias), and the largest. Those below 3
+do not count as more than 5 %, as poor controllers have little fitness. *epuck, touches
+at the end* is the robot on wheels when only those touches are crashes that last to the
+end of a control step.
 
 ![Fitness on each robot against that on the reference]({picture})"""
