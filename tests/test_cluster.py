@@ -467,35 +467,6 @@ def test_without_the_extra_there_is_one_clear_line(monkeypatch):
 # the command line
 
 
-def local_workers(preload: Path, folder: Path) -> Any:
-    """How a study of this process starts its workers."""
-    settings = {
-        "distributed.worker.preload": [str(preload)],
-        "temporary-directory": str(folder),
-    }
-    return dask.config.set(settings)
-
-
-def test_a_study_on_workers_of_its_own(
-    preload, references, tmp_path, monkeypatch, capfd
-):
-    monkeypatch.chdir(tmp_path)
-    Path("mine.yaml").write_text(config("ga", 1, **SMALL).to_yaml())
-    Path("tiny.yaml").write_text(yaml.safe_dump({"experiments": ["mine.yaml"]}))
-    options = "tiny.yaml --seeds 1-2 --output out --cluster local:1"
-    argv = tuple(options.split())
-    with local_workers(preload, tmp_path):
-        assert study(argv) == 0
-    stdout, stderr = capfd.readouterr()
-    assert stderr == ""
-    assert "2 of 2 runs are finished" in stdout
-    assert len(stdout.splitlines()) == 4
-    for seed in (1, 2):
-        folder = tmp_path / "out" / "running" / "mine" / f"seed-{seed}"
-        job = Job("mine", config("ga", seed, **SMALL), folder, argv)
-        assert_packed_as_here(job, tmp_path / "out", references)
-
-
 def test_ctrl_c_ends_workers_of_its_own(preload, tmp_path):
     (tmp_path / "mine.yaml").write_text(config("ga", 1, **ENDLESS).to_yaml())
     (tmp_path / "tiny.yaml").write_text(yaml.safe_dump({"experiments": ["mine.yaml"]}))
@@ -538,7 +509,7 @@ def test_ctrl_c_ends_workers_of_its_own(preload, tmp_path):
 def test_a_worker_and_then_the_scheduler_of_a_study_are_killed(
     preload, references, tmp_path, monkeypatch, capfd
 ):
-    """The first is replaced; the other is the study, whose next call goes on."""
+    """The first is replaced; the other is the study, whose next call ends it."""
     (tmp_path / "mine.yaml").write_text(config("ga", 1, **LONG).to_yaml())
     (tmp_path / "tiny.yaml").write_text(yaml.safe_dump({"experiments": ["mine.yaml"]}))
     argv = ["tiny.yaml", "--seeds", "1-2", "--output", "out", "--cluster", "local:1"]
@@ -556,9 +527,16 @@ def test_a_worker_and_then_the_scheduler_of_a_study_are_killed(
         process.kill()
         process.communicate(timeout=PATIENCE)
     monkeypatch.chdir(tmp_path)
-    with local_workers(preload, tmp_path):
+    settings = {
+        "distributed.worker.preload": [str(preload)],
+        "temporary-directory": str(tmp_path),
+    }
+    with dask.config.set(settings):
         assert study(argv) == 0
-    assert "2 of 2 runs are finished" in capfd.readouterr().out
+    stdout, stderr = capfd.readouterr()
+    assert stderr == ""
+    assert "2 of 2 runs are finished" in stdout
+    assert len(stdout.splitlines()) == 4
     for seed in (1, 2):
         folder = tmp_path / "out" / "running" / "mine" / f"seed-{seed}"
         job = Job("mine", config("ga", seed, **LONG), folder, tuple(argv))
