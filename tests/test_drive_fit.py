@@ -276,11 +276,10 @@ def simulated(own, noise, seed) -> RecordedDrive:
     )
 
 
-@pytest.mark.parametrize("seed", [4, 15])
-def test_wheels_that_slip(seed):
+def test_wheels_that_slip():
     """They show less, and the fit says so."""
-    own = dataclasses.replace(another_robot(seed), latency=0)
-    drive = simulated(own, Noise(counts=1.0, wheels=0.03), seed)
+    own = dataclasses.replace(another_robot(4), latency=0)
+    drive = simulated(own, Noise(counts=1.0, wheels=0.03), 4)
     fit = fit_drive(drive, scene_of(), IDEAL)
     assert 0.01 < fit.slip < 0.05
     assert fit.calibration.wheel_radii == pytest.approx(own.wheel_radii, rel=0.005)
