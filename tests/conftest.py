@@ -1,5 +1,6 @@
 """Shared by all tests: the shipped robot in the paper's arena, in each simulator."""
 
+import gc
 import os
 import signal
 from pathlib import Path
@@ -21,6 +22,11 @@ from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 from epuck_mj.step.control import TaskParameters
 
+IN_REAL_TIME = ("bridge", "fleet", "hostile_peers", "calibrate", "fake", "live")
+LONG = ("extending", "cluster", "signals", "study", "lesson", "drive_fit", "notebook")
+LONG += ("run", "systems", "kinematic", "replay_processes", "verify", "climb", "check")
+"""Names of files with such tests."""
+
 # ignored where tests run in the background of a script, and by all that they start
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -30,6 +36,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
     Processes that are killed while they compile leave nothing behind.
     """
+    # what is imported for all tests stays: nobody has to look through it for garbage
+    gc.disable()
     if not hasattr(config, "workerinput"):
         scene, task = load_scene(KINEMATIC_ROBOT, "arena"), TaskParameters(steps=1)
         trials, network = compiled_trials(scene, task, 1), Network()
@@ -37,6 +45,39 @@ def pytest_configure(config: pytest.Config) -> None:
         nothing = network.decode(np.zeros((1, network.n_genes)))
         trials(nothing, np.zeros((1, 3)), None, 1, np.full(1, -np.inf))
         _move_once(scene)
+
+
+def pytest_collection_finish() -> None:
+    """Collect garbage of the tests only."""
+    gc.freeze()
+    gc.enable()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let each worker of `--dist worksteal` begin with what takes long.
+
+    It begins with an equal part of all tests in their order. What is in real time, and
+    hardly needs a processor, is all at one of them.
+    """
+    workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    parts: list[list[pytest.Item]] = [[] for _ in range(workers)]
+    others: list[pytest.Item] = []
+    for item in items:
+        name = item.path.stem.removeprefix("test_")
+        if name in IN_REAL_TIME:
+            parts[0].append(item)
+        elif name in LONG and workers > 1:
+            parts[1 + LONG.index(name) % (workers - 1)].append(item)
+        else:
+            others.append(item)
+    left = len(items)
+    for number, part in enumerate(parts):
+        size = left // (workers - number)
+        n_more = max(size - len(part), 0)
+        part += others[:n_more]
+        del others[:n_more]
+        left -= size
+    items[:] = [item for part in parts for item in part] + others
 
 
 def _move_once(scene: Scene) -> None:

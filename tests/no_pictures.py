@@ -1,5 +1,7 @@
-"""Runs that draw nothing: pictures take longer than the evolution of a test."""
+"""Runs and drives that draw nothing: pictures take longer than what a test is about."""
 
+import sys
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -23,3 +25,22 @@ def draw_nothing(patch: pytest.MonkeyPatch) -> None:
     """Let runs of this process put something else in the place of their pictures."""
     patch.setattr(results, "_draw_fitness", _stand_in)
     patch.setattr(results, "_show", _stand_in)
+
+
+BRIDGE = """
+import sys
+from types import SimpleNamespace
+from epuck_mj.host.command_line import main
+
+show_nothing = SimpleNamespace(save_pictures=lambda *_: [])
+sys.modules["epuck_mj.bridge.drive.pictures"] = show_nothing
+from epuck_mj.bridge.__main__ import bridge
+main(bridge)
+"""
+"""Code of a bridge without pictures, which take seconds to load."""
+
+
+def show_nothing(patch: pytest.MonkeyPatch) -> None:
+    """Let bridges of this process write no pictures."""
+    instead = SimpleNamespace(save_pictures=lambda *_: [])
+    patch.setitem(sys.modules, "epuck_mj.bridge.drive.pictures", instead)

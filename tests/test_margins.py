@@ -41,6 +41,7 @@ from evolution.run.generation_loop import Evolution
 from evolution.run.means import Means
 from evolution.settings.config_files import find_config, load_config
 from evolution.settings.setting import Setting
+from tests.no_pictures import draw_nothing
 
 ROBOT = "epuck_kinematic"
 
@@ -78,6 +79,7 @@ def test_a_margin_widens_the_body_on_every_robot(scene):
 def test_champions_keep_off_walls_by_the_margin_of_their_bodies():
     config = load_config(find_config("de-best")).model_copy(
         update={"body_margin": 0.002, "climb": 0.5, "evaluations": 900, "steps": 20}
+        | {"trials": 1}
     )
     evolution = Evolution(config, threads=1)
     # what is tested is the robot itself
@@ -89,7 +91,8 @@ def test_champions_keep_off_walls_by_the_margin_of_their_bodies():
     assert again.history() != evolution.history()
 
 
-def test_a_champion_is_chosen_with_the_margin_and_tested_without(tmp_path):
+def test_a_champion_is_chosen_with_the_margin_and_tested_without(tmp_path, monkeypatch):
+    draw_nothing(monkeypatch)
     config = load_config(find_config("de-best")).model_copy(
         update={
             "body_margin": 0.005,

@@ -188,9 +188,15 @@ def evaluated(to_beat: np.ndarray | None, trials: int = 3):
     return evaluate(engine, NETWORK, GENOMES, starts(trials, seed=3), to_beat)
 
 
+@cache
+def without_a_race():
+    """To be looked at only, since tests share it."""
+    return evaluated(None)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_who_beats_what_it_has_to_is_untouched_and_who_does_not_still_loses(seed):
-    whole = evaluated(None)
+    whole = without_a_race()
     to_beat = np.random.default_rng(seed).permutation(whole.fitness)
     raced = evaluated(to_beat)
     wins = whole.fitness > to_beat
@@ -208,7 +214,7 @@ def test_who_beats_what_it_has_to_is_untouched_and_who_does_not_still_loses(seed
 
 
 def test_nobody_who_draws_is_broken_off():
-    whole = evaluated(None)
+    whole = without_a_race()
     raced = evaluated(whole.fitness)
     np.testing.assert_array_equal(raced.steps, whole.steps)
     np.testing.assert_array_equal(raced.trial_fitness, whole.trial_fitness)
@@ -216,7 +222,7 @@ def test_nobody_who_draws_is_broken_off():
 
 @pytest.mark.parametrize("capacity", [3, 4, 5, 7, 35, 36])
 def test_chunks_change_nothing_in_a_race(capacity, monkeypatch):
-    to_beat = evaluated(None).fitness[::-1]
+    to_beat = without_a_race().fitness[::-1]
     whole = evaluated(to_beat)
     monkeypatch.setattr(evaluation, "CAPACITY", capacity)
     parts = evaluated(to_beat)
@@ -226,7 +232,7 @@ def test_chunks_change_nothing_in_a_race(capacity, monkeypatch):
 
 
 def test_an_individual_that_does_not_fit_lives(monkeypatch):
-    whole = evaluated(None)
+    whole = without_a_race()
     monkeypatch.setattr(evaluation, "CAPACITY", 2)
     # to be beaten by nobody
     raced = evaluated(np.full(len(GENOMES), np.inf))
@@ -316,16 +322,16 @@ def test_racing_changes_nothing_but_the_cost(name, fitness):
         assert raced.records == whole.records
 
 
-@pytest.mark.parametrize("capacity", [2, 7, 29])
-def test_chunks_smaller_than_the_population_change_nothing(capacity, monkeypatch):
+def test_chunks_smaller_than_the_population_change_nothing(monkeypatch):
     # trials that are stepped: compiled ones have no chunks
     config = small("de-best", robot="epuck", evaluations=40)
     whole = evolved(config)
-    monkeypatch.setattr(evaluation, "CAPACITY", capacity)
-    parts = evolved(config)
-    assert_same(parts, whole)
-    # as long as an individual fits, as much is saved too
-    assert (parts.records == whole.records) == (capacity >= config.trials)
+    for capacity in (2, 7, 29):
+        monkeypatch.setattr(evaluation, "CAPACITY", capacity)
+        parts = evolved(config)
+        assert_same(parts, whole)
+        # as long as an individual fits, as much is saved too
+        assert (parts.records == whole.records) == (capacity >= config.trials)
 
 
 @pytest.mark.parametrize("name", RACES[:2])

@@ -1,5 +1,6 @@
 """The shipped evidence: it belongs to the shipped models, and to what is said of it."""
 
+import functools
 import json
 from pathlib import Path
 
@@ -117,13 +118,14 @@ def test_the_card_s_champions_were_chosen_by_validation():
         [load_study(RESULTS / "paper"), load_study(RESULTS / "wheels")]
     )
     assert len(table.rows) > 10
+    beside = functools.cache(runs_at)
     for address, _, n, validation, wheels, *_ in table.rows:
         runs = runs_at(RESULTS / address)
         (chosen,) = (run for run in runs if not isinstance(run, RunDirectory))
         scores = chosen.champion.scores
         assert validation == f"{scores['validation']:.0f}"
         assert wheels == f"{scores['held_out']['epuck']['mean']:.0f}"
-        others = runs_at((RESULTS / address).parent.parent)
+        others = beside((RESULTS / address).parent.parent)
         all_of_them = [
             run.champion.scores["validation"]
             for run in others

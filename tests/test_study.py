@@ -675,26 +675,25 @@ def test_runs_end_when_their_study_is_killed(here, carried, reference):
 
 @linux
 @pytest.mark.slow
-def test_tables_have_the_same_bytes_after_any_kill(here):
-    """Killed before the first run has ended, after it, and once more."""
+def test_tables_have_the_same_bytes_after_any_kill(here, carried, capsys):
+    """Killed after the first run has ended, and once more."""
     write_study(here, evaluations=LONG)
     (here / "go").touch()
-    argv = ["quick.py", "mine.yaml", "--seeds", "1-3", "--jobs", "2", "--output"]
-    assert finish(here, *argv, "whole").returncode == 0
+    argv = ["mine.yaml", "--seeds", "1-3", "--jobs", "2", "--output"]
+    assert study([*argv, "whole"]) == 0
     out = here / "killed"
     moments = (
-        lambda: any(map(n_records, (out / "running").glob("*/*"))),
         lambda: (out / "champions.parquet").exists(),
         lambda: len(StudyDirectory(out).tables.packed()) > 2,
     )
     for moment in moments:
-        with python_process(*argv, "killed", cwd=here) as process:
+        with python_process("halting.py", *argv, "killed", cwd=here) as process:
             wait_for(lambda moment=moment: moment() or process.poll() is not None)
             process.kill()
             process.communicate(timeout=PATIENCE)
-    done = finish(here, *argv, "killed")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "6 of 6 runs are finished" in done.stdout
+    capsys.readouterr()
+    assert study([*argv, "killed"]) == 0
+    assert "6 of 6 runs are finished" in capsys.readouterr().out
     assert tables(out) == tables(here / "whole")
     assert not (out / "running").exists()
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,10 +22,16 @@ from evolution.study.tables import Tables
 from tests.study_on_disk import write_study
 
 
-@pytest.fixture
-def path(tmp_path) -> Path:
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> Path:
     seeds = {"de-best": [1, 2], "ga": [1, 2]}
-    return write_study(tmp_path / "study", seeds, packed=False)
+    return write_study(tmp_path_factory.mktemp("whole") / "study", seeds, packed=False)
+
+
+@pytest.fixture
+def path(whole, tmp_path) -> Path:
+    """A study that a test may damage."""
+    return shutil.copytree(whole, tmp_path / "study")
 
 
 def edit(file: Path, change: Callable[[dict], object]) -> None:

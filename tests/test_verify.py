@@ -180,8 +180,14 @@ CHAMPION = {
 }
 
 
-@pytest.mark.parametrize("kind", ["whole", "shipped"])
-@pytest.mark.parametrize("what", CHAMPION)
+# without a checkpoint what was believed is found in another way
+@pytest.mark.parametrize(
+    ("kind", "what"),
+    [
+        *(("whole", what) for what in CHAMPION),
+        *(("shipped", what) for what in ("stored", "gene", "believed", "mean")),
+    ],
+)
 def test_an_edited_champion(what, kind, request, tmp_path, capsys):
     change, words = CHAMPION[what]
     run = request.getfixturevalue(kind)
