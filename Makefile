@@ -24,8 +24,10 @@ run: $(INSTALLED)
 test: $(INSTALLED)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/pyright
-	$(BIN)/python -m pytest -q -n 3 --dist worksteal --durations=20
+	# types are checked while the tests run
+	$(BIN)/pyright & types=$$!; \
+	$(BIN)/python -m pytest -q -n 3 --dist worksteal --durations=20; tests=$$?; \
+	wait $$types && exit $$tests
 
 # the site, in site/; a warning is an error
 docs: $(INSTALLED)
