@@ -109,13 +109,13 @@ def test_both_rungs_measure_what_mj_ray_does(name, set_back):
     poses = FreeSpace(scene, 0.001).sample(np.random.default_rng(5), n)
     model, data = scene.model, mujoco.MjData(scene.model)
     _, _, origin, direction = kinematics(scene, poses)
-    length = np.empty(origin.shape[:2])
+    length = np.empty((n, len(scene.rays)))
     hit = np.zeros(1, np.int32)
     body = model.site_bodyid[scene.rays[0]]
     for i, qpos in enumerate(scene.qpos(poses)):
         data.qpos[:] = qpos
         mujoco.mj_kinematics(model, data)
-        for k in range(length.shape[1]):
+        for k in range(len(scene.rays)):
             length[i, k] = mujoco.mj_ray(
                 model, data, origin[i, k], direction[i, k], None, 1, body, hit
             )

@@ -1,7 +1,8 @@
 """The table of rungs, the only way to a simulator.
 
 A rung belongs to a robot's name, since it changes results. Another one is a module with
-a `Simulator` and a line in `RUNGS`.
+a `Simulator` and an entry in `RUNGS`; another shipped robot, kinematic and on wheels,
+is a line in `model_files.ON_WHEELS`.
 """
 
 from collections.abc import Callable, Mapping
