@@ -52,9 +52,9 @@ class Speed:
 
 def measure_kinematic(repeats: int) -> dict[str, float]:
     """Speeds, and ratios of speeds in one turn: medians over `repeats` turns."""
-    square, wheels = (
-        load_scene("epuck_kinematic", "arena"),
-        load_scene("epuck", "arena"),
+    square, cones, wheels = (
+        load_scene(robot, "arena")
+        for robot in ("epuck_kinematic", "epuck_cone_kinematic", "epuck")
     )
     along = _works(square, N_TRIALS)
     jobs: dict[str, Callable[[], Speed]] = {
@@ -63,6 +63,7 @@ def measure_kinematic(repeats: int) -> dict[str, float]:
         "two_threads": _job(square, along(None), 2),
         "noise": _job(square, along(Conditions("calibrated")), 1),
         "other_robots": _job(square, along(Conditions("calibrated", True)), 1),
+        "cones": _job(cones, along(None), 1),
         "wheels": _job(wheels, _works(wheels, N_ON_WHEELS)(None), 1),
     }
     with tempfile.TemporaryDirectory() as folder:
@@ -84,6 +85,7 @@ def measure_kinematic(repeats: int) -> dict[str, float]:
             lambda t: t["two_threads"].clock / t["along_walls"].clock
         ),
         "cost_of_noise": median(lambda t: t["along_walls"].cpu / t["noise"].cpu),
+        "cost_of_cones": median(lambda t: t["along_walls"].cpu / t["cones"].cpu),
         "cost_of_noise_and_other_robots": median(
             lambda t: t["along_walls"].cpu / t["other_robots"].cpu
         ),

@@ -415,7 +415,7 @@ def test_reproduction_says_everything_once():
     assert "ga: no finished run of seed 9" in text
     assert "| literal | 150 | 249.0 | 248.0 | circler 100% |" in text
     assert "| wall-follower, written by hand |  |  | 196.9 | 195.8 |  |" in text
-    # the most believed is worth 100 less than the champion
+    # the highest stored is worth 100 less than the champion
     assert "| DE/best/1/bin | 12 | 242.5 [239.8, 245.2] | 137.0 [137.0" in text
     tables = [line for line in text.splitlines() if line.startswith("|")]
     assert all(line.endswith("|") for line in tables)

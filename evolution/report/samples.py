@@ -68,8 +68,9 @@ def with_noise(data: StudyData, name: str) -> bool:
 def believed_on(data: StudyData) -> str:
     """The robot on which stored fitness is compared with tests.
 
-    The one on which evolution ended, where most believed individuals were tested; the
-    first that champions were tested on, if runs differ in it or do not say.
+    The one on which evolution ended, where individuals of the highest stored fitness
+    were tested; the first that champions were tested on, if runs differ in it or do not
+    say.
     """
     found = {
         believed.robot
@@ -90,7 +91,7 @@ def like_for_like(data: StudyData, name: str) -> np.ndarray:
 
 
 def most_believed_fitness(data: StudyData, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Stored and held-out fitness of each run's most believed individual, `(n,)`.
+    """Stored and held-out fitness of each run's highest stored individual, `(n,)`.
 
     Held-out on the robot of `believed_on`; of the runs that say. None say of
     experiments with noise: theirs was tested on ideal robots only.

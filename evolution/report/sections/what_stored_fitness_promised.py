@@ -1,4 +1,4 @@
-"""What stored fitness promised: stored against held-out fitness, and the luck."""
+"""What stored fitness promised: stored against held-out fitness."""
 
 import numpy as np
 
@@ -19,8 +19,8 @@ WITH_NOISE = (
 
 
 FITNESSES = (
-    *("champion: stored", "champion: held-out", "champion: luck"),
-    *("most believed: stored", "most believed: held-out", "most believed: luck"),
+    *("champion: stored", "champion: held-out", "champion: too high by"),
+    *("highest: stored", "highest: held-out", "highest: too high by"),
     "regained",
 )
 """Columns of fitness."""
@@ -54,9 +54,9 @@ def what_stored_fitness_promised_section(data: StudyData) -> list[Block]:
         Heading("What stored fitness promised"),
         Paragraph(
             f"On the {robot_name(robot)}: stored and held-out fitness of the champion, "
-            "then of the individual with the highest stored fitness of the run (most "
-            "believed). The difference is luck: the highest of many noisy evaluations "
-            "is too high. Regained: how much more held-out fitness the champion, "
+            "then of the individual with the highest stored fitness of the run "
+            "(highest). Stored fitness is too high, because it is the highest of many "
+            "noisy evaluations. Regained: how much more held-out fitness the champion, "
             "chosen on validation starts, has than that individual, for each run."
             + (f" {WITH_NOISE}" if noisy else "")
         ),
