@@ -423,11 +423,11 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
     for row in rows:
         kind, world = row["kind"], int(row["number"])
         policy = kinds[kind][row["policy"]]
-        there = policy["in_worlds"][world]["fitness"]
+        there = policy["in_worlds"]["fitness"][world]
         share = there / max(policy["nominal"], policy["ideal"][world])
         assert float(row["share"]) == pytest.approx(share, abs=1e-4)
         assert float(row["fitness"]) == pytest.approx(there, abs=1e-4)
-        crashes = policy["in_worlds"][world]["crash_rate"]
+        crashes = policy["in_worlds"]["crash_rate"][world]
         assert float(row["crash_rate"]) == pytest.approx(crashes, abs=1e-4)
         assert row["arena"] == record["worlds"][kind][world]["arena"]
     assert imread(output / "gap.png").shape[1] > 1000

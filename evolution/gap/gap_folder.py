@@ -3,7 +3,7 @@
 import json
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from itertools import islice
 from pathlib import Path
 
@@ -28,6 +28,10 @@ Places = Mapping[str, Sequence[World]]
 Measured = dict[str, tuple[list[Outcome], list[list[Outcome]], list[list[Outcome]]]]
 """For each kind of worlds, outcomes in nominal conditions, on ideal robots in each
 world's arena, and in each world."""
+
+
+MEASURES = tuple(field.name for field in fields(Outcome))
+"""What is measured of a policy in a world."""
 
 
 def write_gap(
@@ -122,9 +126,13 @@ def _write(
                     policy.name: {
                         **asdict(verdict(gap.transfers[robot], i)),
                         "ideal": [world[i].fitness for world in outcomes[gap.kind][1]],
-                        "in_worlds": [
-                            asdict(world[i]) for world in outcomes[gap.kind][2]
-                        ],
+                        "in_worlds": {
+                            measure: [
+                                getattr(world[i], measure)
+                                for world in outcomes[gap.kind][2]
+                            ]
+                            for measure in MEASURES
+                        },
                     }
                     for i, policy in enumerate(policies)
                 }
@@ -134,7 +142,7 @@ def _write(
         },
     }
     with writing():
-        write_text(folder / "gap.json", json.dumps(record, indent=1) + "\n")
+        write_text(folder / "gap.json", json.dumps(record) + "\n")
         write_text(folder / "gap.csv", _rows(places, gaps))
         write_text(folder / "gap.md", to_markdown(gap_document(gaps)))
         write_text(folder / "summary.md", to_markdown([gap_summary(gaps)]))
@@ -143,7 +151,10 @@ def _write(
 
 
 def _rows(places: Places, gaps: Sequence[Gap]) -> str:
-    """Rows of gap.csv, one per kind of worlds, robot, policy and world."""
+    """Rows of gap.csv, one per kind of worlds, robot, policy and world.
+
+    What a world is like is in gap.json.
+    """
     rows = [
         {
             "robot": robot,
@@ -152,7 +163,9 @@ def _rows(places: Places, gaps: Sequence[Gap]) -> str:
             "crash_rate": f"{transfer.crash_rate[j, i]:.4f}",
             "share": f"{transfer.share[j, i]:.4f}",
             "collisions_per_minute": f"{transfer.collisions[j, i]:.4f}",
-            **asdict(world),
+            "kind": world.kind,
+            "number": world.number,
+            "arena": world.arena,
         }
         for gap in gaps
         for robot, transfer in gap.transfers.items()
