@@ -24,8 +24,8 @@ run: $(INSTALLED)
 test: $(INSTALLED)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	# types are checked while the tests run
-	$(BIN)/pyright & types=$$!; \
+	# types are checked while the tests run, some of which are in real time
+	nice -n 15 $(BIN)/pyright & types=$$!; \
 	$(BIN)/python -m pytest -q -n 3 --dist worksteal --durations=20; tests=$$?; \
 	wait $$types && exit $$tests
 

@@ -38,6 +38,9 @@ def pytest_configure(config: pytest.Config) -> None:
     """
     # what is imported for all tests stays: nobody has to look through it for garbage
     gc.disable()
+    # the first worker has what is in real time: the others wait for it
+    if getattr(config, "workerinput", {}).get("workerid", "gw0") != "gw0":
+        os.nice(10)
     if not hasattr(config, "workerinput"):
         scene, task = load_scene(KINEMATIC_ROBOT, "arena"), TaskParameters(steps=1)
         trials, network = compiled_trials(scene, task, 1), Network()
