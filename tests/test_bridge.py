@@ -287,14 +287,14 @@ def test_over_wifi(kinematic, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("fault", ["stall@1.2", "disconnect@1.2+0.5", "gone@1.2"])
+@pytest.mark.parametrize("fault", ["stall@3", "disconnect@3+0.5", "gone@3"])
 def test_faults_over_wifi(kinematic, tmp_path, fault):
     endpoint = Tcp(0)
     with living(endpoint, kinematic, AT_WALL, "wifi", fault) as emulator:
         name = endpoint.name.replace("socket:", "tcp:")
         done = run(name, tmp_path / "log", disturbed=True)
-        assert emulator.body.standing == (fault != "gone@1.2")
-    assert done.returncode == (4 if fault == "gone@1.2" else 3), done.stderr
+        assert emulator.body.standing == (fault != "gone@3")
+    assert done.returncode == (4 if fault == "gone@3" else 3), done.stderr
     assert done.stderr.count("\n") == 1
     assert "e-puck2 over WiFi, selector at 3" in done.stdout
     trajectory = Trajectory.load(tmp_path / "log.npz")
@@ -396,16 +396,16 @@ def test_a_reader_that_went_away(kinematic, port, tmp_path):
 @pytest.mark.parametrize(
     ("faults", "status", "cause"),
     [
-        ("stall@1", 3, "the robot did not answer for 0.3 s, so it was stopped"),
-        ("reset@1", 3, "the robot "),
-        ("disconnect@1+0.5", 3, "the connection to the robot was lost, so it was sto"),
+        ("stall@3", 3, "the robot did not answer for 0.3 s, so it was stopped"),
+        ("reset@3", 3, "the robot "),
+        ("disconnect@3+0.5", 3, "the connection to the robot was lost, so it was sto"),
         (
-            "gone@1",
+            "gone@3",
             4,
             "THE MOTORS MAY STILL TURN, switch the robot off: the robot did not "
             "confirm that it stopped; before that, the connection to the robot was l",
         ),
-        ("loss@1+100", 3, "the robot did not answer for 0.3 s, so it was stopped"),
+        ("loss@3+100", 3, "the robot did not answer for 0.3 s, so it was stopped"),
         ("noise@0.8,noise@1,noise@1.2,noise@1.4,noise@1.6,noise@1.8", None, ""),
         ("garbage@1,garbage@1.5", None, ""),
     ],
