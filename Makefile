@@ -24,10 +24,8 @@ run: $(INSTALLED)
 test: $(INSTALLED)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	# types are checked while the tests run, some of which are in real time
-	nice -n 15 $(BIN)/pyright & types=$$!; \
-	$(BIN)/python -m pytest -q -n 3 --dist worksteal --durations=20; tests=$$?; \
-	wait $$types && exit $$tests
+	$(BIN)/pyright
+	$(BIN)/python -m pytest -q -n 2 --dist worksteal --durations=20
 
 # the site, in site/; a warning is an error
 docs: $(INSTALLED)
