@@ -18,8 +18,8 @@ import tyro
 from epuck_mj.host.files import write_text, writing
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import KINEMATIC_ROBOT
+from tests.fleets import Terminal, all_move, robots, slowest_stop
 from tests.test_fake import wait_for
-from tests.test_fleet import Terminal, all_move, robots, slowest_stop
 
 ENDS = re.compile(r"robot-\d+: (\d+) control steps, (\d+) too long")
 

@@ -19,6 +19,7 @@ from evolution.settings.config_files import (
     load_config,
     shipped_experiments,
 )
+from tests.refusals import refused
 from tests.shipped import HYBRIDS
 
 # Source: paper, section 4; what it leaves open: paper notes, section 3
@@ -174,10 +175,7 @@ def config_file(tmp_path):
 
 def refusal(path: Path) -> str:
     """What `load_config` says of a file, which must be one line that names it."""
-    with pytest.raises(UserError) as info:
-        load_config(path)
-    message = str(info.value)
-    assert "\n" not in message
+    message = refused(load_config, path)
     assert str(path) in message
     return message
 

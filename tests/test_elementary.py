@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from epuck_mj.rungs.kinematic import elementary as kernel
+from epuck_mj.rungs.kinematic import elementary as one_number
 from epuck_mj.rungs.kinematic.compiling import compiled
 from epuck_mj.step import elementary
 
@@ -30,7 +30,7 @@ def each(function, values, results):
 def test_one_number_and_many_have_the_same_bits(name):
     many = MANY if name != "log" else MANY[(MANY > 0) & np.isfinite(MANY)]
     results = np.empty_like(many)
-    each(getattr(kernel, name), many, results)
+    each(getattr(one_number, name), many, results)
     np.testing.assert_array_equal(results, getattr(elementary, name)(many))
 
 
@@ -75,5 +75,5 @@ def test_interpolation_is_numpy_s_and_the_compiled_one_is_the_same():
     x = np.concatenate([RNG.uniform(-0.5, 1.5, 2000), xs])
     expected = elementary.interpolate(x, xs, ys)
     np.testing.assert_allclose(expected, np.interp(x, xs, ys), rtol=1e-13, atol=1e-13)
-    one = np.array([kernel.interpolate(value, xs, ys) for value in x])
+    one = np.array([one_number.interpolate(value, xs, ys) for value in x])
     np.testing.assert_array_equal(one, expected)

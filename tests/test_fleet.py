@@ -5,14 +5,11 @@ The fleet and its drivers are processes of their own; the robots live in this on
 
 import contextlib
 import os
-import pty
 import re
 import signal
 import subprocess
 import sys
-import threading
 import time
-from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,7 +21,6 @@ import pytest
 from epuck_mj.bridge.__main__ import bridge
 from epuck_mj.bridge.drive.order import Order
 from epuck_mj.bridge.fake.emulator import Emulator
-from epuck_mj.bridge.fake.endpoints import Pty, Tcp
 from epuck_mj.bridge.fake.scenarios import scenario
 from epuck_mj.bridge.fleet import crew, fleet_drive, screen
 from epuck_mj.bridge.fleet.driver import MODULE
@@ -34,9 +30,10 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.output import Output
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.trials.trajectory import Trajectory
+from tests.fleets import Terminal, all_move, robots, slowest_stop
 from tests.no_pictures import BRIDGE, show_nothing
 from tests.processes import PATIENCE, python_process
-from tests.test_fake import living, wait_for
+from tests.test_fake import wait_for
 
 CHAMPION = Path(__file__).parent.parent / "benchmarks" / "controllers" / "fragile.json"
 
@@ -55,19 +52,6 @@ STANDS = 0.5
 def no_pictures(monkeypatch):
     """Of fleets in this process."""
     show_nothing(monkeypatch)
-
-
-@contextmanager
-def robots(scene, folder: Path, *faults: str, kind="tcp") -> Iterator[dict]:
-    """Emulated robots by their ports' names, one for each text of faults."""
-    with contextlib.ExitStack() as stack:
-        there = {}
-        for number, fault in enumerate(faults):
-            port = Tcp(0) if kind == "tcp" else Pty(folder / f"e-puck-{number}")
-            start = (0.15 * number - 0.3, 0.0, np.pi / 2)
-            emulator = stack.enter_context(living(port, scene, start, faults=fault))
-            there[port.name] = emulator
-        yield there
 
 
 def command(ports, log, *arguments: str) -> list[str]:
@@ -92,28 +76,6 @@ def on_a_terminal(arguments: list[str]):
         terminal.close()
 
 
-class Terminal:
-    """The person's side of a terminal, which reads all that is shown."""
-
-    def __init__(self):
-        self.master, self.slave = pty.openpty()
-        self.shown = ""
-        threading.Thread(target=self._read, daemon=True).start()
-
-    def _read(self):
-        with contextlib.suppress(OSError):
-            while data := os.read(self.master, 10_000):
-                self.shown += data.decode()
-
-    def press(self, keys: bytes):
-        os.write(self.master, keys)
-
-    def close(self):
-        for handle in (self.master, self.slave):
-            with contextlib.suppress(OSError):
-                os.close(handle)
-
-
 def befall(emulator: Emulator, fault: str) -> None:
     """Let it happen now, however long the robot had to wait until it drove."""
     assert emulator._begun is not None
@@ -121,19 +83,8 @@ def befall(emulator: Emulator, fault: str) -> None:
     emulator._faults = scenario(fault.format(f"{now:.3f}"))
 
 
-def all_move(there: dict[str, Emulator]) -> bool:
-    return not any(emulator.body.standing for emulator in there.values())
-
-
 def ever_drove(emulator: Emulator) -> bool:
     return any(row[0] or row[2] for row in emulator.body.journal.command)
-
-
-def slowest_stop(there: dict[str, Emulator]) -> float:
-    """Wait until all robots stand; how long the last one took [s]."""
-    began = time.monotonic()
-    wait_for(lambda: all(each.body.standing for each in there.values()), "stood")
-    return time.monotonic() - began
 
 
 def driven(log: Path, name: str) -> Trajectory:

@@ -4,14 +4,12 @@ import pytest
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.yaml_and_json import parse_yaml, read_json, read_yaml, to_yaml
+from tests.refusals import refused as one_line
 
 
 def refused(read, path, content: bytes) -> str:
     path.write_bytes(content)
-    with pytest.raises(UserError) as error:
-        read(path)
-    message = str(error.value)
-    assert "\n" not in message
+    message = one_line(read, path)
     assert f"'{path}'" in message
     return message
 

@@ -12,6 +12,7 @@ from epuck_mj.rungs.table import RUNGS
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import MODELS, ON_WHEELS, ROBOT_FILES
 from epuck_mj.scene.robot_parts import PREFIX, PROXIMITY, ROBOT_BODY
+from tests.refusals import refused
 
 
 def whole_body(model) -> tuple[float, np.ndarray, np.ndarray]:
@@ -215,11 +216,7 @@ def test_a_copied_arena_needs_no_copied_robot(tmp_path, robot):
 
 
 def refusal(robot="epuck", arena="arena", control_step=0.1) -> str:
-    with pytest.raises(UserError) as error:
-        load_scene(str(robot), str(arena), control_step)
-    message = str(error.value)
-    assert "\n" not in message
-    return message
+    return refused(load_scene, str(robot), str(arena), control_step)
 
 
 def edited(tmp_path, old: str, new: str, source: str = "epuck.xml"):

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.scene.model_files import MODELS
 from evolution.run.lock import locked
@@ -24,6 +23,7 @@ from evolution.study.config import (
 from evolution.study.data import load_study
 from evolution.study.directory import StudyDirectory
 from tests.processes import PATIENCE
+from tests.refusals import refused
 from tests.shipped import HYBRIDS, OPTIMIZERS, PAPERS
 
 ROBOTS = {"paper": "epuck_kinematic", "quick": "epuck_kinematic", "wheels": "epuck"}
@@ -41,16 +41,6 @@ def study(text: str) -> StudyConfig:
     """A study of that text, from a file in the working directory."""
     Path("study.yaml").write_text(text)
     return StudyConfig.load(Path("study.yaml"))
-
-
-def refused(act, *arguments) -> str:
-    """The one line that a user gets."""
-    with pytest.raises(UserError) as info:
-        act(*arguments)
-    message = str(info.value)
-    assert message.strip()
-    assert "\n" not in message
-    return message
 
 
 # seeds

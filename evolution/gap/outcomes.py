@@ -7,16 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from epuck_mj.rungs.disturbed import disturbed
 from epuck_mj.rungs.simulator import Simulator
 from epuck_mj.rungs.table import robots_in
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.starts import FreeSpace
-from epuck_mj.step.control import TaskParameters, Trials, run_trials
+from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.disturbances import Disturbances
 from evolution.gap.side_by_side import SideBySide
 from evolution.gap.worlds import World, met, starts_in
-from evolution.judging.evaluation import CAPACITY, Work
+from evolution.judging.evaluation import CAPACITY, Work, run_work
 from evolution.judging.held_out_starts import starts_for_test
 from evolution.named_policies import NamedPolicy
 
@@ -123,23 +122,12 @@ def _outcomes(
 ) -> dict[int, Outcome]:
     """Outcomes of some policies by number, all from the same starts `(n, 3)`."""
     n, many = len(starts), len(members)
-    same = np.tile(np.arange(n), many)
     work = Work(
         SideBySide.of([policies[i].policy for i in members], n),
-        starts[same],
-        disturbances=None if disturbances is None else disturbances[same],
+        np.tile(starts, (many, 1)),
+        disturbances=None if disturbances is None else disturbances.tiled(many),
     )
-    trials = Trials.joined(
-        [
-            run_trials(
-                disturbed(robots, part.disturbances, task.control_step),
-                part.controller,
-                part.starts,
-                task,
-            )
-            for part in work.chunks(robots.capacity)
-        ]
-    )
+    trials = run_work(robots, work, task)
     fitness, steps, crashed = (
         each.reshape(many, n) for each in (trials.fitness, trials.steps, trials.crashed)
     )

@@ -20,6 +20,7 @@ from epuck_mj.policies.network import Controller
 from epuck_mj.policies.topology import Topology
 from epuck_mj.rungs.disturbed import disturbed
 from epuck_mj.rungs.late import with_late_commands
+from epuck_mj.rungs.simulator import Simulator
 from epuck_mj.rungs.table import compiled_trials, robots_in
 from epuck_mj.rungs.warnings import unstable
 from epuck_mj.scene.model import Scene
@@ -174,24 +175,36 @@ class BatchEngine:
         if work.race is not None and work.race.trials > self._robots.capacity:
             # too few robots for all trials of an individual: no trial is ended early
             work = replace(work, race=None)
-        parts = [
-            run_trials(
-                self._driven(part.disturbances),
-                part.controller,
-                part.starts,
-                self._task,
-                None if part.race is None else part.race.lost,
-            )
-            for part in work.chunks(self._robots.capacity)
-        ]
-        return Trials.joined(parts)
+        return run_work(self._robots, work, self._task, self._late)
 
-    def _driven(self, disturbances: Disturbances | None) -> Robots:
-        """The robots of trials with these disturbances."""
-        if disturbances is None:
-            self._robots.disembody()
-            return with_late_commands(self._robots, self._late)
-        return disturbed(self._robots, disturbances, self._task.control_step)
+
+def run_work(
+    robots: Simulator, work: Work, task: TaskParameters, late: int = 0
+) -> Trials:
+    """Simulate trials step by step, as many at a time as there are robots.
+
+    Args:
+        robots: that drive.
+        work: the trials.
+        task: what a trial is.
+        late: control steps until a command has reached the wheels of ideal robots.
+    """
+
+    def driven(disturbances: Disturbances | None) -> Robots:
+        ready = disturbed(robots, disturbances, task.control_step)
+        return ready if disturbances is not None else with_late_commands(ready, late)
+
+    parts = [
+        run_trials(
+            driven(part.disturbances),
+            part.controller,
+            part.starts,
+            task,
+            None if part.race is None else part.race.lost,
+        )
+        for part in work.chunks(robots.capacity)
+    ]
+    return Trials.joined(parts)
 
 
 class DmControlEngine:
