@@ -1,6 +1,5 @@
 """Measurements: what the physics step costs, and what it may cost."""
 
-import os
+from epuck_mj.host.loading import set_environment
 
-# as in the project's commands: dm_control looks for no display
-os.environ.setdefault("MUJOCO_GL", "disabled")
+set_environment()

@@ -206,9 +206,9 @@ def test_starting_loads_what_is_used(modules, absent):
     assert (done.stdout.strip(), done.stderr) == ("", "")
 
 
-def without_display(*arguments: str) -> tuple[int, str, str]:
-    """What a Python process with these arguments ends with, and says."""
-    gone = ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL")
+def without_settings(*arguments: str) -> tuple[int, str, str]:
+    """What a Python process without display or settings ends with, and says."""
+    gone = ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL", "OPENBLAS_NUM_THREADS")
     result = subprocess.run(
         [sys.executable, "-W", "error", *arguments],
         env={k: v for k, v in os.environ.items() if k not in gone},
@@ -226,19 +226,20 @@ def test_nothing_here_draws():
         # the kinematic robot's first compilation is announced
         "g.FollowWallsEnv(robot='epuck').reset()"
     )
-    assert without_display("-c", code) == (0, "", "")
+    assert without_settings("-c", code) == (0, "", "")
 
 
-def test_only_commands_say_how_mujoco_draws():
-    """Who imports the package may draw by any means that MuJoCo has."""
-    code = "import epuck_mj, os; print(os.environ.get('MUJOCO_GL'))"
-    assert without_display("-c", code) == (0, "None\n", "")
+def test_only_commands_change_the_environment():
+    """Who imports the package may draw by any means, and multiply in any threads."""
+    say = "print(*map(os.environ.get, ['MUJOCO_GL', 'OPENBLAS_NUM_THREADS']))"
+    code = f"import epuck_mj, os; {say}"
+    assert without_settings("-c", code) == (0, "None None\n", "")
     # the module of a command, loaded as `python -m` does
     command = (
         "import sys, os, importlib\n"
         "sys.argv, sys.orig_argv[1:] = ['-m'], ['-m', {0!r}]\n"
-        "importlib.import_module({0!r}); print(os.environ.get('MUJOCO_GL'))"
+        f"importlib.import_module({{0!r}}); {say}"
     )
     for name in ("epuck_mj.check", "evolution.run", "benchmarks.ppo.network"):
-        found = without_display("-c", command.format(name))
-        assert found == (0, "disabled\n", "")
+        found = without_settings("-c", command.format(name))
+        assert found == (0, "disabled 1\n", "")

@@ -36,8 +36,7 @@ def prepare() -> None:
     """In a command: let errors and signals while loading show no traceback."""
     if not is_command():
         return
-    # commands make OpenGL themselves, if they draw: see `show.render`
-    os.environ.setdefault("MUJOCO_GL", "disabled")
+    set_environment()
     # a file must not get the number of a closed standard stream
     for number in range(3):
         try:
@@ -46,6 +45,14 @@ def prepare() -> None:
             os.open(os.devnull, os.O_RDWR)
     end_at_interrupts()
     sys.excepthook = _report
+
+
+def set_environment() -> None:
+    """Tell libraries how to work in a command, where the user has not told them."""
+    # commands make OpenGL themselves, if they draw: see `show.render`
+    os.environ.setdefault("MUJOCO_GL", "disabled")
+    # threads for matrices of 40 by 40 wait for each other, for most of a CMA-ES
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def end_at_interrupts() -> None:
