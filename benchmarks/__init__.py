@@ -1,4 +1,4 @@
-"""Measurements: what the physics step costs, and what it may cost."""
+"""Measurements of speed, memory and agreement; the Makefile has their commands."""
 
 from epuck_mj.host.loading import set_environment
 

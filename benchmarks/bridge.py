@@ -6,18 +6,18 @@ one at the same times, which shows that nothing is lost or changed on the way, a
 with control steps all alike, which shows what a real robot's timing does to a path.
 """
 
-import json
 import os
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import tyro
 
+from benchmarks.figures import write_figures
 from epuck_mj.bridge.drive.robot import RealRobot
 from epuck_mj.bridge.drive.session import Session
 from epuck_mj.bridge.fake.builds import BUILDS
@@ -25,6 +25,7 @@ from epuck_mj.bridge.fake.simulated_body import Journal
 from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.bridge.line.serial_port import SerialPort
+from epuck_mj.host.command_line import main, parse
 from epuck_mj.host.files import read_arrays
 from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import WallFollower
@@ -64,8 +65,9 @@ class Options:
     champion: Path | None = None
 
 
-def main(options: Options) -> None:
-    """Measure, print and write."""
+def measure_bridge(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status."""
+    options = parse(Options, "python -m benchmarks.bridge", argv, Options())
     task, policy = TaskParameters(), WallFollower()
     if options.champion is not None:
         file = load_controller(options.champion)
@@ -76,8 +78,8 @@ def main(options: Options) -> None:
         print(robot)
         for name, value in results[robot].items():
             print(f"  {name:36} {value:10.4g}")
-    if options.json is not None:
-        options.json.write_text(json.dumps(results, indent=1) + "\n")
+    write_figures(options.json, results)
+    return 0
 
 
 def measure(
@@ -176,4 +178,4 @@ def _emulator(robot: str, port: Path, journal: Path) -> subprocess.Popen:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Options))
+    main(measure_bridge)

@@ -10,14 +10,15 @@ within 2.5 % of the shipped configuration's at a fifth of the shipped step: half
 import copy
 import statistics
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
-import tyro
 
+from epuck_mj.host import files
+from epuck_mj.host.command_line import main, parse
 from epuck_mj.policies.file import load_controller
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.rungs.table import robots_in
@@ -146,12 +147,16 @@ class Options:
     output: Path = REPORT
 
 
-def main(options: Options) -> None:
-    """Measure, print and write the table."""
+def measure_convergence(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status."""
+    options = parse(Options, "python -m benchmarks.convergence", argv, Options())
     header = HEADER.format(starts=options.starts, margin=MARGIN)
     text = [header, "", *_table(options.starts)]
-    options.output.write_text("\n".join(text) + "\n")
-    print(options.output.read_text())
+    report = "\n".join(text) + "\n"
+    with files.writing():
+        files.write_text(options.output, report)
+    print(report)
+    return 0
 
 
 def _table(n_starts: int) -> list[str]:
@@ -211,4 +216,4 @@ any controller; up to {margin:.1%} passes, half of what the tests allow. Cost: C
 of a control step, the shipped one's is 1; differences of a few per cent are noise."""
 
 if __name__ == "__main__":
-    main(tyro.cli(Options))
+    main(measure_convergence)

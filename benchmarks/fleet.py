@@ -10,16 +10,15 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import tyro
-
-from epuck_mj.host.files import write_text, writing
+from benchmarks.figures import write_figures
+from epuck_mj.host.command_line import main, parse
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import KINEMATIC_ROBOT
-from tests.fleets import Terminal, all_move, robots, slowest_stop
-from tests.test_fake import wait_for
+from tests.fleets import Terminal, all_move, robots, slowest_stop, wait_for
 
 ENDS = re.compile(r"robot-\d+: (\d+) control steps, (\d+) too long")
 
@@ -39,8 +38,9 @@ class Options:
     robots: int = 10
 
 
-def main(options: Options) -> None:
-    """Measure, print and write."""
+def measure_fleet(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status."""
+    options = parse(Options, "python -m benchmarks.fleet", argv, Options())
     scene = load_scene(KINEMATIC_ROBOT, "arena")
     terminal = Terminal()
     with (
@@ -76,10 +76,9 @@ def main(options: Options) -> None:
         "seconds_from_the_key_to_the_last_stop": round(stopped, 3),
     }
     print(json.dumps(found, indent=1))
-    if options.json is not None:
-        with writing():
-            write_text(options.json, json.dumps(found, indent=1) + "\n")
+    write_figures(options.json, found)
+    return 0
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Options))
+    main(measure_fleet)

@@ -9,19 +9,19 @@ turns. Speeds are control steps per CPU-second, so they fall where other program
 the same core.
 """
 
-import json
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
-import tyro
 
+from benchmarks.figures import write_figures
 from epuck_mj.environments.gymnasium import ID
+from epuck_mj.host.command_line import main, parse
 from epuck_mj.policies.network import Network
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
@@ -55,8 +55,9 @@ class Options:
     robots: int = 1024
 
 
-def main(options: Options) -> None:
-    """Measure, print and write."""
+def measure_gymnasium(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status."""
+    options = parse(Options, "python -m benchmarks.gymnasium", argv, Options())
     jobs = {
         name: _environment(options.robots, robot=KINEMATIC_ROBOT, **each)
         for name, each in OPTIONS.items()
@@ -78,8 +79,8 @@ def main(options: Options) -> None:
     }
     for name, value in results.items():
         print(f"  {name:36} {value:12,.4g}")
-    if options.json is not None:
-        options.json.write_text(json.dumps(results, indent=1) + "\n")
+    write_figures(options.json, results)
+    return 0
 
 
 def _rate(work: Callable[[], int]) -> float:
@@ -118,4 +119,4 @@ def _evaluation(n: int) -> Callable[[], float]:
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Options))
+    main(measure_gymnasium)

@@ -7,7 +7,6 @@ first nothing can be saved, and it counts ten times: the shares are a little too
 Time is that of the trials.
 """
 
-import json
 import statistics
 import sys
 import time
@@ -18,7 +17,7 @@ from typing import Self
 
 import tyro
 
-from epuck_mj.host import files
+from benchmarks.figures import write_figures
 from epuck_mj.host.command_line import main, parse
 from epuck_mj.scene.model import Scene
 from epuck_mj.step.control import TaskParameters, Trials
@@ -125,9 +124,7 @@ def racing(argv: Sequence[str]) -> int:
         f"median: {result['median_share_of_steps']:.3f} of the control steps, "
         f"{result['median_share_of_time']:.3f} of the time"
     )
-    if options.json is not None:
-        with files.writing():
-            files.write_text(options.json, json.dumps(result, indent=1) + "\n")
+    write_figures(options.json, result)
     return 0
 
 

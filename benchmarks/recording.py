@@ -4,7 +4,6 @@ Time of writing one beside that of the simulation it shows, sizes, and the time 
 whole `evolution.replay` from its start to the written file.
 """
 
-import json
 import statistics
 import subprocess
 import sys
@@ -14,8 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from benchmarks.figures import write_figures
 from epuck_mj.host.command_line import main, parse
-from epuck_mj.host.files import write_text
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from epuck_mj.scene.starts import FreeSpace
@@ -78,8 +77,7 @@ def measure(argv: Sequence[str]) -> int:
         }
     for name, value in figures.items():
         print(f"{name:24} {value:12,.4g}")
-    if options.json is not None:
-        write_text(options.json, json.dumps(figures, indent=1) + "\n")
+    write_figures(options.json, figures)
     return 0
 
 

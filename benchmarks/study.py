@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from epuck_mj.host import files
+from benchmarks.figures import write_figures
 from epuck_mj.host.command_line import main, parse
 from evolution.judging.evaluation import BatchEngine
 from evolution.judging.held_out import Judge
@@ -109,9 +109,7 @@ def study(argv: Sequence[str]) -> int:
     if options.evaluations:
         found |= overhead(options.evaluations)
         print(f"overhead: {found['overhead']:.1%} of the wall time")
-    if options.json is not None:
-        with files.writing():
-            files.write_text(options.json, json.dumps(found, indent=1) + "\n")
+    write_figures(options.json, found)
     return 0
 
 

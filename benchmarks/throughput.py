@@ -12,21 +12,21 @@ CPU time; what two threads gain is wall time and wants an idle machine.
 """
 
 import itertools
-import json
 import os
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
 import numpy as np
-import tyro
 from dm_control.rl import control
 
+from benchmarks.figures import write_figures
 from benchmarks.kinematic import circling, measure_kinematic
 from epuck_mj.environments.dm_control import FollowWalls, environment
+from epuck_mj.host.command_line import main, parse
 from epuck_mj.policies.network import Controller
 from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
@@ -69,8 +69,9 @@ class Turn:
     dm_control: Rate
 
 
-def main(options: Options) -> None:
-    """Measure, print and write."""
+def measure_throughput(argv: Sequence[str]) -> int:
+    """Run the command line; its exit status."""
+    options = parse(Options, "python -m benchmarks.throughput", argv, Options())
     results = {}
     for robot, measured in (
         (WHEELED_ROBOT, measure_wheels),
@@ -80,8 +81,8 @@ def main(options: Options) -> None:
         print(robot)
         for name, value in results[robot].items():
             print(f"  {name:36} {value:10.4g}")
-    if options.json is not None:
-        options.json.write_text(json.dumps(results, indent=1) + "\n")
+    write_figures(options.json, results)
+    return 0
 
 
 def measure_wheels(repeats: int) -> dict[str, float]:
@@ -162,4 +163,4 @@ def _dm_control(
 
 
 if __name__ == "__main__":
-    main(tyro.cli(Options))
+    main(measure_throughput)

@@ -6,7 +6,6 @@ and their share of crashes.
 """
 
 import itertools
-import json
 import resource
 import statistics
 import tempfile
@@ -17,7 +16,7 @@ from pathlib import Path
 
 import tyro
 
-from epuck_mj.host import files
+from benchmarks.figures import write_figures
 from epuck_mj.host.command_line import main, parse
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.model_files import WHEELED_ROBOT
@@ -131,10 +130,8 @@ def whole_runs(argv: Sequence[str]) -> int:
     # later runs keep what earlier ones have loaded
     megabytes = runs[0]["megabytes"]
     print(f"\nmedian {statistics.median(means):.1f} of 300; {megabytes:.0f} MB")
-    if options.json is not None:
-        found = {"medians": medians, "megabytes": megabytes, "runs": runs}
-        with files.writing():
-            files.write_text(options.json, json.dumps(found, indent=1) + "\n")
+    found = {"medians": medians, "megabytes": megabytes, "runs": runs}
+    write_figures(options.json, found)
     return 0
 
 

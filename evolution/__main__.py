@@ -14,6 +14,7 @@ COMMANDS = {
     "evolution.replay": "watch champions in the rerun viewer, on a page, as video",
     "evolution.evaluate": "test champions on new starts, in any arena",
     "evolution.study": "do many runs: every experiment with every seed",
+    "evolution.study.pack": "put the runs of an older study into its tables",
     "evolution.report": "write tables and figures of a study",
     "evolution.margins": "test champions on robots that differ in one number",
     "evolution.hybrids": "write a page about evolution that learns",

@@ -19,7 +19,8 @@ from epuck_mj.host.command_line import (
     word,
 )
 from epuck_mj.host.limits import check_flag
-from epuck_mj.step.conditions import ConditionFlags, Conditions
+from epuck_mj.step.condition_flags import ConditionFlags
+from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.disturbances import Disturbances
 from evolution.judging.held_out_starts import held_out_disturbances
 from evolution.judging.scores import HeldOut

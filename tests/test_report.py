@@ -19,6 +19,7 @@ from markdown_it import MarkdownIt
 from scipy import stats
 
 from epuck_mj.errors import UserError
+from epuck_mj.host.csv_text import csv_text
 from evolution.judging.scores import HeldOut
 from evolution.pages import figure_files
 from evolution.pages.blocks import (
@@ -34,7 +35,6 @@ from evolution.pages.blocks import (
     to_markdown,
     with_contents,
 )
-from evolution.pages.csv_text import csv_text
 from evolution.pages.words import numbered, spread
 from evolution.report.__main__ import report_study
 from evolution.report.measures import BEST_STORED
@@ -754,7 +754,8 @@ def test_experiments_of_other_budgets_are_not_compared(tmp_path):
     config.write_text(yaml.safe_dump(fields, sort_keys=False))
     data = load_study(path)
     assert (
-        "comparisons with de-best: evaluations times trials of de-rand are others"
+        "comparisons with de-best of de-rand, whose number of trials (evaluations "
+        "times trials) is another"
     ) in data.missing
     pairs = [pair for each in comparisons(data).values() for pair in each]
     assert {(pair.a, pair.b) for pair in pairs} == {("de-best", "ga")}
@@ -770,7 +771,8 @@ def test_experiments_of_other_settings_are_not_compared(tmp_path):
     config.write_text(yaml.safe_dump(fields, sort_keys=False))
     data = load_study(path)
     assert (
-        "comparisons with de-best: arena, task or start clearance of de-rand are others"
+        "comparisons with de-best of de-rand, whose arena, task or start clearance is "
+        "another"
     ) in data.missing
     pairs = [pair for each in comparisons(data).values() for pair in each]
     assert {(pair.a, pair.b, pair.family) for pair in pairs} == {("de-best", "ga", 1)}

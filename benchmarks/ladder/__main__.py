@@ -9,7 +9,7 @@ written.
 import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.convergence import REFINEMENT, held_out_starts
@@ -32,7 +32,7 @@ def _reference(arena: str) -> Scene:
 
 def _end_of_step(arena: str) -> Scene:
     """On wheels; a touch that is over at the end of a control step is no crash."""
-    return replace(load_scene("epuck", arena), _touches=slice(0))
+    return load_scene("epuck", arena).touched_at_end()
 
 
 COLUMNS: Mapping[str, Callable[[str], Scene]] = {

@@ -3,7 +3,6 @@
 import contextlib
 import gc
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -103,7 +102,7 @@ def _drive_alone(options: Options, order: Order) -> int:
     wanted, show = mission(order), _show(options, order)
     # no garbage collection of loaded modules, neither during the drive nor at its end
     gc.freeze()
-    status = drive_alone(wanted, lambda: connect(order.port), show, time.monotonic)
+    status = drive_alone(wanted, lambda: connect(order.port), show)
     if status == RUNAWAY:
         leave_to_last_resort(order.port)
     return status

@@ -33,6 +33,7 @@ class Options:
         start_clearance: least distance from the shell to a wall at a start [m].
         noise: name of a level of `NOISE`.
         randomise: whether each trial has a different robot; needs noise.
+        randomise_all: whether these differ in all that real ones differ in.
         calibration: calibration of the robot in all trials, or its file; needs noise.
         latency: control steps until a command has reached the wheels of ideal robots;
             randomised ones have latencies of their own.
@@ -53,6 +54,7 @@ class Options:
     start_clearance: float = START_CLEARANCE
     noise: str = "none"
     randomise: bool = False
+    randomise_all: bool = False
     calibration: Calibration | str | Path | None = None
     latency: int = 0
     threads: int = 0
@@ -65,13 +67,10 @@ class Options:
             for name in ("robot", "arena", "fitness", "noise"):
                 if not isinstance(value := getattr(self, name), str):
                     raise ValueError(f"{name}: expected a text, got {shown(value)}")
-            if self.noise not in NOISE:
-                raise ValueError(
-                    f"unknown noise '{self.noise}'; available: {', '.join(NOISE)}"
-                )
-            if not isinstance(self.randomise, bool):
-                got = shown(self.randomise)
-                raise ValueError(f"randomise: expected True or False, got {got}")
+            for name in ("randomise", "randomise_all"):
+                if not isinstance(value := getattr(self, name), bool):
+                    got = shown(value)
+                    raise ValueError(f"{name}: expected True or False, got {got}")
             given = self.calibration
             if not isinstance(given, Calibration | str | Path | None):
                 raise ValueError(f"calibration: expected a path, got {shown(given)}")
@@ -110,4 +109,4 @@ class Options:
         given = self.calibration
         if isinstance(given, str | Path):
             given = Calibration.load(Path(given))
-        return Conditions(self.noise, self.randomise, given)
+        return Conditions(self.noise, self.randomise, given, self.randomise_all)

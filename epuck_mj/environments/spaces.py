@@ -51,8 +51,8 @@ def checked_action(given: object, shape: tuple[int, ...]) -> np.ndarray:
     )
 
 
-def checked_starts(given: object, shape: tuple[int, ...]) -> np.ndarray:
-    """Starts of a shape, `(..., 3)`: x, y [m], yaw [rad].
+def checked_starts(given: object, shape: tuple[int, ...], name: str) -> np.ndarray:
+    """Starts of a shape, `(..., 3)`: x, y [m], yaw [rad]; given under that name.
 
     Raises:
         UserError: for anything else.
@@ -63,7 +63,8 @@ def checked_starts(given: object, shape: tuple[int, ...]) -> np.ndarray:
         starts = np.full(1, np.nan)
     if starts.shape != shape or not np.isfinite(starts).all():
         raise UserError(
-            f"starts: expected finite numbers of shape {shape}: x, y [m], yaw [rad]"
+            f"{name}: expected finite numbers of shape {shape}: x, y [m], yaw [rad], "
+            f"got {shown(given)}"
         )
     return starts
 
@@ -104,4 +105,4 @@ def start_of(
     given = options or {}
     if unknown := [key for key in given if key != name]:
         raise UserError(f"unknown reset option '{unknown[0]}'; available: {name}")
-    return None if name not in given else checked_starts(given[name], shape)
+    return None if name not in given else checked_starts(given[name], shape, name)

@@ -5,10 +5,7 @@ import numpy as np
 from epuck_mj.scene.changed_robots import outward
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL
-from epuck_mj.step.bodies import Bodies
-
-SPARE_SPEED = 2.0
-"""Highest wheel speed of embodied robots, as a multiple of the actuators' limits."""
+from epuck_mj.step.bodies import SPARE_SPEED, Bodies
 
 Fields = dict[str, tuple[np.ndarray, np.ndarray]]
 """Where fields of MuJoCo's model differ, by name: a mask or indices, and the values

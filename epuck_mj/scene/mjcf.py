@@ -40,7 +40,6 @@ class Compiled:
 
     Attributes:
         model: the compiled model.
-        spec: what it was compiled from.
         sha256: of each file: `arena`, `robot`, and all others by path from the arena's
             folder or the robot's.
         arena: files of the arena.
@@ -49,7 +48,6 @@ class Compiled:
     """
 
     model: mujoco.MjModel
-    spec: mujoco.MjSpec
     sha256: Mapping[str, str]
     arena: SourceFiles
     floor: tuple[int, ...]
@@ -107,7 +105,7 @@ def compiled(
             raise BadXml.of(
                 element, "its file was not found, so a change in it would go unnoticed"
             )
-    return Compiled(model, spec, sha256, arena_files, floor, height)
+    return Compiled(model, sha256, arena_files, floor, height)
 
 
 def make_whole(arena: mujoco.MjSpec) -> None:

@@ -5,6 +5,9 @@ from typing import Self
 
 import numpy as np
 
+SPARE_SPEED = 2.0
+"""Highest wheel speed of embodied robots, as a multiple of the actuators' limits."""
+
 
 @dataclass(frozen=True, eq=False)
 class Bodies:

@@ -71,7 +71,7 @@ class TaskParameters:
     Attributes:
         steps: control steps of a trial.
         control_step: duration of a control step [s].
-        fitness: name of the step fitness: `product`, `literal` or `my.py:name`.
+        fitness: name of the step fitness: one of `FORMULAS` or `my.py:name`.
         sensor_range: distance at which an obstacle stops being seen [m].
         speeds: what a full action means.
 
@@ -93,7 +93,10 @@ class TaskParameters:
             check(name, getattr(self, name))
         fitness: Any = self.fitness
         if not (isinstance(fitness, str) and (fitness in FORMULAS or is_own(fitness))):
-            raise ValueError(f"unknown fitness {shown(fitness)}")
+            raise ValueError(
+                f"unknown fitness {shown(fitness)}; available: {', '.join(FORMULAS)}, "
+                "or my.py:name for a function of your own"
+            )
 
     @classmethod
     def of(cls, keys: Any) -> Self:

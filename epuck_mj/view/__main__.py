@@ -23,7 +23,8 @@ from epuck_mj.policies.file import champion_file, load_controller
 from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.scene.model_files import is_kinematic
 from epuck_mj.step.calibration import Calibration
-from epuck_mj.step.conditions import ConditionFlags, Conditions
+from epuck_mj.step.condition_flags import ConditionFlags
+from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import START_CLEARANCE, Policy, TaskParameters
 from epuck_mj.step.disturbances import Disturbances
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+from epuck_mj.host.csv_text import csv_text
 from epuck_mj.host.files import write_text, writing
 from evolution.gap.figure import gap_figure
 from evolution.gap.gap_document import gap_document, gap_summary
@@ -19,7 +20,6 @@ from evolution.gap.transfer import Gap, Transfer, verdict
 from evolution.gap.worlds import KINDS, World, worlds
 from evolution.named_policies import NamedPolicy
 from evolution.pages.blocks import to_markdown
-from evolution.pages.csv_text import csv_text
 from evolution.pages.figure_files import write_figure
 
 Places = Mapping[str, Sequence[World]]

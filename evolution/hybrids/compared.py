@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,8 +41,9 @@ class Compared:
         name: experiment.
         other: the one that it is compared with.
         runs: number of runs of the one that has fewer.
-        shift: of the first against the second, and the test that there is none.
-        p: of a difference, Holm-adjusted in its family.
+        shift: of the first against the second, and the test that there is none, its p
+            Holm-adjusted in the family.
+        p: of a difference, likewise adjusted.
     """
 
     name: str
@@ -152,11 +153,13 @@ def _family(data: StudyData, pairs: Sequence[tuple[str, str]]) -> list[Compared]
         (data.held_out(a, WHEELED_ROBOT), data.held_out(b, WHEELED_ROBOT))
         for a, b in pairs
     ]
-    adjusted = holm(np.array([mann_whitney(a, b).p for a, b in samples]))
     margin = MARGIN * data.steps
+    shifts = [equivalence(a, b, margin) for a, b in samples]
+    alike = holm(np.array([shift.p for shift in shifts])).tolist()
+    differ = holm(np.array([mann_whitney(a, b).p for a, b in samples])).tolist()
     return [
-        Compared(name, other, min(len(a), len(b)), equivalence(a, b, margin), p)
-        for (name, other), (a, b), p in zip(
-            pairs, samples, adjusted.tolist(), strict=True
+        Compared(*names, min(map(len, two)), replace(shift, p=p_alike), p)
+        for names, two, shift, p_alike, p in zip(
+            pairs, samples, shifts, alike, differ, strict=True
         )
     ]

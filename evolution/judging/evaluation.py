@@ -1,12 +1,13 @@
 """Evaluation: fitness of genomes, all of a generation on the same trials.
 
-Two engines with the same bits: `batch` steps all robots at once on
-`mujoco.batch.Batch`; `dm_control` steps the dm_control task, one trial after another.
+Engines with the same bits: `batch` runs compiled trials of a kinematic robot, or steps
+all MuJoCo robots at once on `mujoco.batch.Batch`; `dm_control` steps the dm_control
+task, one trial after another; the cluster's sends trials to other machines.
 
 Racing: some individuals matter only if they exceed a known fitness. The trials of such
 an individual end as soon as it cannot exceed that fitness any more, since no control
-step is worth more than 1. An individual that exceeds it has all its trials, so every
-comparison has the same outcome.
+step is worth more than the step fitness's maximum. An individual that exceeds it has
+all its trials, so every comparison has the same outcome.
 """
 
 from collections.abc import Iterator

@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 
 from epuck_mj.host.command_line import word
-from epuck_mj.step.conditions import ConditionFlags
+from epuck_mj.step.condition_flags import ConditionFlags
 
 
 @dataclass(frozen=True)

@@ -66,8 +66,9 @@ def _viewer() -> dict[str, bytes]:
         until = time.monotonic() + PATIENCE
         return {name: _fetched(f"{address}/{name}", until) for name in PARTS}
     finally:
-        process.terminate()
-        process.wait(PATIENCE)
+        # it only serves files
+        process.kill()
+        process.wait()
 
 
 def free_ports(n: int) -> list[int]:

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
+from epuck_mj.host.csv_text import csv_text
 from epuck_mj.policies.wall_follower import YARDSTICK
 from evolution.pages.blocks import FIGURES_FOLDER, Picture
-from evolution.pages.csv_text import csv_text
 from evolution.pages.figure_files import write_page
 from evolution.report.ioh import export_histories
 from evolution.report.page import report_blocks

@@ -16,8 +16,7 @@ from epuck_mj.step.fitness import FORMULAS
 from evolution.report.__main__ import report_study
 from evolution.study.__main__ import study
 
-QUICK = (("quick", "1-3"),)
-FULL = (("paper", "1-100"),)
+QUICK, FULL = ("quick", "1-3"), ("paper", "1-100")
 """Studies and their seeds."""
 
 
@@ -69,29 +68,25 @@ def reproduce_paper(argv: Sequence[str]) -> int:
             f"expected studies in folders of different names, got '{options.study}' "
             f"and '{options.wheels}'"
         )
-    if options.study is not None:
-        places, failed = [options.study, options.wheels], 0
-    else:
-        places, failed = [], 0
-        for name, seeds in FULL if options.full else QUICK:
-            place = options.output / name
-            status = study([name, "--seeds", seeds, "--output", str(place)])
-            # 1: some runs failed, the others can be reported
-            if status > 1:
-                return status
-            failed = max(failed, status)
-            places.append(place)
+    place, failed = options.study, 0
+    if place is None:
+        name, seeds = FULL if options.full else QUICK
+        place = options.output / name
+        failed = study([name, "--seeds", seeds, "--output", str(place)])
+        # 1: some runs failed, the others can be reported
+        if failed > 1:
+            return failed
     # slow to import
     from evolution.reproduce.first_generation import first_generation
     from evolution.reproduce.reproduction import reproduction
     from evolution.study.data import load_study
 
-    studies = [load_study(place) for place in filter(None, places)]
-    for place in filter(None, places):
+    main_study = load_study(place)
+    wheels = None if options.wheels is None else load_study(options.wheels)
+    for each in filter(None, (place, options.wheels)):
         report_study(
-            [str(place), "--output", str(options.output / f"report-{place.name}")]
+            [str(each), "--output", str(options.output / f"report-{each.name}")]
         )
-    main_study, *others = studies
     config = next(iter(main_study.configs.values()))
     try:
         unevolved = [first_generation(config, name) for name in FORMULAS]
@@ -99,7 +94,6 @@ def reproduce_paper(argv: Sequence[str]) -> int:
         # the arena may be on another machine; everything else can be shown
         print(f"missing: the first generation: {error}", file=sys.stderr)
         unevolved = []
-    wheels = others[0] if others else None
     text = reproduction(
         main_study, wheels, unevolved, shell_command("evolution.reproduce", *argv)
     )

@@ -18,7 +18,7 @@ class Claim:
         text: what the paper says.
         ours: what we found, with interval.
         n: runs that it is based on.
-        verdict: consistent, inconsistent or can't be tested, and why not.
+        verdict: consistent, inconsistent, undecided, or can't be tested and why not.
     """
 
     text: str

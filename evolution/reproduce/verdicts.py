@@ -18,7 +18,7 @@ from evolution.statistics.significance import FEWEST_FOR_STARS, LEVELS
 
 CONSISTENT, INCONSISTENT = "consistent", "inconsistent"
 NOT_CONTRADICTED = "consistent, in that nothing contradicts it"
-UNDECIDED = "can't be tested: undecided by these runs"
+UNDECIDED = "undecided by these runs"
 TOO_FEW = f"can't be tested: fewer than {FEWEST_FOR_STARS} runs"
 NOT_MEASURED = "can't be tested: not measured"
 OTHER_STUDY = "can't be tested: another study"

@@ -41,8 +41,10 @@ class Options:
     Attributes:
         experiment: a shipped experiment (de-best, de-rand, ga, random-search,
             one-plus-one-es, one-plus-one-es-as-first-shipped, cma-es, lra-cma-es,
-            l-shade, openai-es, ssshc, de-best-calibrated, de-best-randomised,
-            ga-randomised) or a YAML file; must be the first argument.
+            l-shade, openai-es, ssshc, de-best-then-cma-es, memetic-de,
+            imitators-then-cma-es, lifetime-learning, policy-gradient, best, robust,
+            de-best-calibrated, de-best-randomised, ga-randomised) or a YAML file; must
+            be the first argument.
         config: the experiment's keys; a flag overrides the YAML file.
         optimizer: an optimiser of your own, my.py:Class, instead of the experiment's.
         output: run directory; runs/<experiment>-seed-<seed> if not given.

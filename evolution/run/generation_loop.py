@@ -168,7 +168,8 @@ class Evolution:
 
     def release(self) -> None:
         """Free the simulated robots, hundreds of megabytes, once all is evolved."""
-        self.__dict__.pop("engine", None)
+        vars(self).pop("engine", None)
+        self._lesson_robots = None
 
     def _generation(self) -> Record:
         config = self.config

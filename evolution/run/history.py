@@ -9,6 +9,7 @@ import numpy as np
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
+from epuck_mj.host.csv_text import csv_columns, csv_text
 from epuck_mj.scene.model_files import on_wheels
 
 
@@ -53,12 +54,13 @@ def history_text(records: Sequence[Record], robot: str) -> str:
         records: of all generations.
         robot: with which the run began.
     """
-    rows = [
-        ",".join([*(repr(getattr(record, name)) for name in HISTORY), name_of])
+    climbed = on_wheels(robot)
+    rows = (
+        {name: getattr(record, name) for name in HISTORY}
+        | {ROBOT: climbed if record.climbed else robot}
         for record in records
-        for name_of in [on_wheels(robot) if record.climbed else robot]
-    ]
-    return "\n".join([",".join([*HISTORY, ROBOT]), *rows]) + "\n"
+    )
+    return csv_text([*HISTORY, ROBOT], rows)
 
 
 def read_history(path: Path) -> dict[str, np.ndarray]:
@@ -71,17 +73,17 @@ def read_history(path: Path) -> dict[str, np.ndarray]:
     """
     text = files.read_text(path)
     try:
-        header, *lines = text.splitlines() or [""]
-        known = [",".join(HISTORY), ",".join([*HISTORY, ROBOT])]
-        n, texts = len(HISTORY), [line.split(",") for line in lines]
-        rows = np.array([[float(x) for x in text[:n]] for text in texts])
-        if header not in known or rows.ndim != 2 or not len(rows):
+        texts = csv_columns(text)
+        known = [(*HISTORY,), (*HISTORY, ROBOT)]
+        if tuple(texts) not in known or not texts[HISTORY[0]]:
             raise ValueError(f"expected rows of {','.join(HISTORY)}")
-        columns = dict(zip(HISTORY, rows.T, strict=True))
-        others = [text[n:] != texts[0][n:] for text in texts]
-        columns[CLIMBED] = np.array(others, float)
+        columns = {name: np.array(texts[name], float) for name in HISTORY}
+        robots = texts.get(ROBOT, [])
+        others = [robot != robots[0] for robot in robots]
+        columns[CLIMBED] = np.array(others or np.zeros(len(texts[HISTORY[0]])), float)
         spent = np.diff(columns["evaluations"], prepend=0)
-        if (spent <= 0).any() or not np.isfinite(rows).all():
+        finite = all(np.isfinite(each).all() for each in columns.values())
+        if (spent <= 0).any() or not finite:
             raise ValueError("evaluations do not rise, or a value is not finite")
     except ValueError as error:
         raise UserError(f"'{path}' is damaged: {error}") from None
@@ -120,7 +122,9 @@ def timing_text(
     """
     taken: dict[int, str] = {}
     if files.is_file(before):
-        columns = csv_columns(before.read_text(encoding="utf-8", errors="replace"))
+        columns = {}
+        with suppress(ValueError):
+            columns = csv_columns(before.read_text(encoding="utf-8", errors="replace"))
         numbers, each = (columns.get(name, []) for name in ("generation", "seconds"))
         for number, text in zip(numbers, each, strict=False):
             # ignore a row that was cut off
@@ -139,12 +143,3 @@ def timing_text(
 def table_text(path: Path) -> str:
     """The text of a table beside a history; empty if there is none."""
     return files.read_text(path) if files.is_file(path) else ""
-
-
-def csv_columns(text: str) -> dict[str, list[str]]:
-    """Columns of a text of comma-separated values, by name; empty what a row lacks."""
-    header, *rows = [line.split(",") for line in text.splitlines()] or [[]]
-    return {
-        name: [row[i] if i < len(row) else "" for row in rows]
-        for i, name in enumerate(header)
-    }

@@ -225,6 +225,7 @@ def _shown(
         disable=not sys.stderr.isatty(),
     ) as bar:
         for event in events:
+            before = done[event.job]
             if not event.ended:
                 done[event.job] = event.evaluations
             elif event.failure is None:
@@ -234,7 +235,7 @@ def _shown(
                 sys.stdout.flush()
             else:
                 tqdm.write(f"{event.job} failed: {event.failure}", file=sys.stderr)
-            bar.update(sum(done.values()) - bar.n)
+            bar.update(done[event.job] - before)
             yield event
 
 

@@ -180,14 +180,14 @@ def load_study(path: Path) -> StudyData:
     differing = [n for n in others if configs[n].setting != configs[first].setting]
     if differing:
         missing.append(
-            f"comparisons with {first}: arena, task or start clearance of "
-            f"{', '.join(differing)} are others"
+            f"comparisons with {first} of {', '.join(differing)}, whose arena, task "
+            "or start clearance is another"
         )
     unequal = [n for n in others if configs[n].budget != configs[first].budget]
     if unequal:
         missing.append(
-            f"comparisons with {first}: evaluations times trials of "
-            f"{', '.join(unequal)} are others"
+            f"comparisons with {first} of {', '.join(unequal)}, whose number of trials "
+            "(evaluations times trials) is another"
         )
     try:
         if not differing:

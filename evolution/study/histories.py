@@ -10,12 +10,12 @@ import pyarrow as pa
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
+from epuck_mj.host.csv_text import csv_columns
 from evolution.run.directory import RunDirectory
 from evolution.run.history import (
     CLIMBED,
     HISTORY,
     ROBOT,
-    csv_columns,
     read_history,
     table_text,
 )

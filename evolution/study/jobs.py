@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from evolution.run.execution import Loaded
 
 PATIENCE = 10.0
-"""How long to wait for another process to leave a run's directory [s]."""
+"""How long to wait for a process to leave a run's directory, and to end [s]."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ def carry_out_side_by_side(
                 assert isinstance(line, Connection)
                 job, worker = busy[line]
                 try:
-                    event: Event = line.recv()
+                    event = Event(job, *line.recv())
                 except (EOFError, ConnectionResetError):
                     event = Event(job, ended=True, failure=worker.ending())
                 else:
@@ -181,7 +181,7 @@ def carry_out_side_by_side(
 
 
 class _Worker:
-    """A process that does jobs, and the pipe on which it gets and reports them."""
+    """A process that does jobs, and its pipe: jobs come, what is new of them goes."""
 
     def __init__(self, means: Means):
         """Start the process, which ignores Ctrl-C, as its parent ends it."""
@@ -195,7 +195,11 @@ class _Worker:
 
     def ending(self) -> str:
         """Wait for the end of the process; the reason."""
-        self.process.join()
+        self.process.join(PATIENCE)
+        if self.process.is_alive():
+            # it was stopped, and gets no other signal
+            self.process.kill()
+            self.process.join()
         self.line.close()
         status = self.process.exitcode or 0
         if status < 0:
@@ -215,14 +219,13 @@ def _work(means: Means, line: Connection) -> None:
             failure = None
             try:
                 loaded = loaded or _nothing_loaded(means)
-                report = partial(_report, line, job)
-                carry_out(job, means, report, loaded)
+                carry_out(job, means, partial(_report, line), loaded)
                 failure_log(job.directory).unlink(missing_ok=True)
             except (BrokenPipeError, ConnectionResetError):
                 raise
             except Exception as error:
                 failure = failure_of(job, error)
-            line.send(Event(job, ended=True, failure=failure))
+            line.send((0, True, failure))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         # the parent has ended: the files on disk can be resumed at any moment
         os._exit(1)
@@ -235,8 +238,9 @@ def _nothing_loaded(means: Means) -> "Loaded":
     return Loaded(means.threads)
 
 
-def _report(line: Connection, job: Job, done: int) -> None:
-    line.send(Event(job, done))
+def _report(line: Connection, done: int) -> None:
+    # the parent knows the job; its configuration would take longer than a generation
+    line.send((done, False, None))
 
 
 def failure_of(job: Job, error: Exception) -> str:

@@ -9,8 +9,9 @@ from pathlib import Path
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
+from epuck_mj.host.csv_text import csv_columns
 from epuck_mj.policies.file import CHAMPIONS
-from evolution.run.history import csv_columns, table_text
+from evolution.run.history import table_text
 from evolution.study.columns import Row, rows_of, table_of
 from evolution.study.config import StudyConfig
 from evolution.study.histories import (

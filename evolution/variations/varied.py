@@ -43,9 +43,9 @@ class Varied:
         held_out: fitness of the champions on wheels, `(runs,)`.
         crash_rate: of the same trials, `(runs,)`.
         stored: best stored fitness of each run, `(runs,)`.
-        against: how it is shifted against the unchanged algorithm; None if there is
-            none with comparable fitness.
-        p: of a difference from it, Holm-adjusted for all variations; nan if unknown.
+        against: how it is shifted against the unchanged algorithm, its p Holm-adjusted
+            for all variations; None if there is none with comparable fitness.
+        p: of a difference from it, likewise adjusted; nan if unknown.
     """
 
     algorithm: str
@@ -141,11 +141,17 @@ def varied_of(studies: Sequence[StudyData]) -> list[Varied]:
     ]
     if not compared:
         return found
+    shifts = [
+        equivalence(found[i].held_out, base.held_out, MARGIN * base.steps)
+        for i, base in compared
+    ]
     p = [mann_whitney(found[i].held_out, base.held_out).p for i, base in compared]
-    for (i, base), adjusted in zip(compared, holm(np.array(p)).tolist(), strict=True):
-        margin = MARGIN * base.steps
-        shifted = equivalence(found[i].held_out, base.held_out, margin)
-        found[i] = replace(found[i], against=shifted, p=adjusted)
+    alike = holm(np.array([shift.p for shift in shifts])).tolist()
+    differ = holm(np.array(p)).tolist()
+    for (i, _), shift, p_alike, p_differ in zip(
+        compared, shifts, alike, differ, strict=True
+    ):
+        found[i] = replace(found[i], against=replace(shift, p=p_alike), p=p_differ)
     return found
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from epuck_mj.host.csv_text import csv_columns
 from epuck_mj.host.own_parts import is_own
 from epuck_mj.policies.file import CHAMPIONS
 from epuck_mj.scene.model_files import on_wheels
@@ -26,7 +27,6 @@ from evolution.run.history import (
     HISTORY,
     ROBOT,
     Record,
-    csv_columns,
     timing_text,
 )
 from evolution.run.results import judged, shown_trials

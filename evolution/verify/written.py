@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from epuck_mj.host import files
+from epuck_mj.host.csv_text import csv_columns
 from epuck_mj.host.yaml_and_json import read_json
 from epuck_mj.policies.file import ControllerFile
 from epuck_mj.trials.trajectory import Trajectory
 from evolution.judging.scores import read_champion
 from evolution.run.directory import RunDirectory
-from evolution.run.history import csv_columns, read_best_individuals, read_history
+from evolution.run.history import read_best_individuals, read_history
 from evolution.settings.config import ExperimentConfig
 from evolution.study.addresses import PlacedRun
 from evolution.study.directory import RUNNING, StudyDirectory

@@ -2,7 +2,6 @@
 
 import contextlib
 import sys
-import time
 from collections.abc import Callable
 
 from epuck_mj.bridge.drive.console import HEADING, drive_summary, live_line
@@ -23,7 +22,6 @@ def drive_alone(
     mission: Mission,
     connect: Callable[[], Connection],
     show: Show,
-    clock: Callable[[], float] = time.monotonic,
 ) -> int:
     """Drive, stop, write the log, and return the exit status.
 
@@ -31,7 +29,6 @@ def drive_alone(
         mission: what to do.
         connect: opens the way to the robot.
         show: writes the log's pictures, when the robot stands.
-        clock: what the connection tells times by.
 
     Raises:
         UserError: if it never began, or its log could not be written.
@@ -43,7 +40,7 @@ def drive_alone(
     ):
         terminal = Terminal(mission, output, keys)
         try:
-            outcome = accomplish(mission, connect, terminal, interruption, clock)
+            outcome = accomplish(mission, connect, terminal, interruption)
         finally:
             terminal.end_line()
         # tell the user before the pictures, which take time; stdout may be lost

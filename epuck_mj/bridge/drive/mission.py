@@ -99,7 +99,6 @@ def accomplish(
     connect: Callable[[], Connection],
     watcher: Watcher,
     interruption: Interruption,
-    clock: Callable[[], float] = time.monotonic,
 ) -> Outcome:
     """Drive, stop, write the arrays of the log, and return how the drive ended.
 
@@ -108,7 +107,6 @@ def accomplish(
         connect: opens the way to the robot.
         watcher: of the drive.
         interruption: what ends it before its time.
-        clock: what the connection tells times by.
 
     Raises:
         UserError: if it never began.
@@ -126,11 +124,10 @@ def accomplish(
             mission.speed_max,
             mission.dry_run,
             mission.start,
-            clock,
         )
         # however the inner block ends, the outer one stops the robot
         with robot, interruption.raising():
-            word = _drive(mission, robot, session, watcher, clock, interruption)
+            word = _drive(mission, robot, session, watcher, interruption)
     except Interrupted:
         word = "interrupted"
     except StillMoving as error:
@@ -159,7 +156,6 @@ def _drive(
     robot: RealRobot,
     session: Session,
     watcher: Watcher,
-    clock: Callable[[], float],
     interruption: Interruption,
 ) -> str:
     """Drive the robot; why the drive ended as planned."""
@@ -169,7 +165,7 @@ def _drive(
         watcher.say("it takes up to 3 seconds ...")
         robot.calibrate()
         watcher.say("calibrated")
-    for step in session.drive(robot, mission.policy, mission.n_steps, clock):
+    for step in session.drive(robot, mission.policy, mission.n_steps, time.monotonic):
         stop = watcher.saw(step, robot)
         # it may have come where python cannot raise anything
         if interruption.signum is not None:

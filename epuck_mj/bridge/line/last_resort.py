@@ -38,7 +38,6 @@ def leave_to_last_resort(port: str) -> None:
 
 def stop_at_last(
     connect: Callable[[], Connection],
-    seconds: float = PURSUIT_TIME,
     clock: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> bool:
@@ -46,11 +45,10 @@ def stop_at_last(
 
     Args:
         connect: opens the way to it.
-        seconds: how long it is tried.
         clock: returns the time [s].
         sleep: waits for a number of seconds.
     """
-    until = clock() + seconds
+    until = clock() + PURSUIT_TIME
     while clock() < until:
         try:
             connection = connect()

@@ -5,7 +5,6 @@ from functools import cached_property
 import numpy as np
 
 from epuck_mj.constants import N_PROXIMITY
-from epuck_mj.rungs.bodies import SPARE_SPEED
 from epuck_mj.rungs.kinematic.kernel import (
     COS,
     LEFT_AHEAD,
@@ -27,7 +26,7 @@ from epuck_mj.rungs.kinematic.kernel import (
 from epuck_mj.rungs.kinematic.plan import SUBSTEP, Plan, plan_of
 from epuck_mj.scene.clearance import ClearanceProbe, beside_wider
 from epuck_mj.scene.model import Scene
-from epuck_mj.step.bodies import Bodies
+from epuck_mj.step.bodies import SPARE_SPEED, Bodies
 from epuck_mj.step.elementary import cos_sin, exp
 from epuck_mj.step.sensors import Reading
 

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from epuck_mj.constants import N_PROXIMITY
-from epuck_mj.rungs.bodies import SPARE_SPEED
 from epuck_mj.rungs.kinematic.compiling import compiled
 from epuck_mj.rungs.kinematic.drivers import Drivers, decide, notice
 from epuck_mj.rungs.kinematic.kernel import (
@@ -20,6 +19,7 @@ from epuck_mj.rungs.kinematic.kernel import (
 )
 from epuck_mj.rungs.kinematic.noise import Noise, motor, sensed
 from epuck_mj.rungs.kinematic.plan import Plan
+from epuck_mj.step.bodies import SPARE_SPEED
 from epuck_mj.step.fitness import SPACED_FAR, SPACED_NEAR
 from epuck_mj.step.sensors import PROXIMITY_REACH
 

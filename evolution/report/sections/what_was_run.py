@@ -101,7 +101,7 @@ def what_was_run_section(data: StudyData) -> list[Block]:
             f"most {data.steps}: fewer if the robot crashes, or if racing stops an "
             "individual that cannot win any more. The choice of the champion costs "
             f"extra, for every algorithm: {_validation_starts(data)} trials of each "
-            f"candidate. Candidates are {_candidates(data)} and the last "
+            f"candidate. Candidates are all of the last population and the last "
             f"{LATEST_BEST} individuals that raised the run's best; some of them are "
             f"the same.{_finalists(data)}"
         ),
@@ -121,10 +121,6 @@ def evolved_on(data: StudyData) -> str:
 
 def _kinematic(data: StudyData) -> bool:
     return is_kinematic(next(iter(data.configs.values())).robot)
-
-
-def _candidates(data: StudyData) -> str:
-    return "all of the last population"
 
 
 def _finalists(data: StudyData) -> str:
