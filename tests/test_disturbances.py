@@ -18,6 +18,7 @@ from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.robot_parts import ROBOT_BODY
 from epuck_mj.step.bodies import Bodies
 from epuck_mj.step.calibration import Calibration
+from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.disturbances import (
     ALL_RANGES,
@@ -435,6 +436,12 @@ def test_noise_of_generations_differs():
         for seed in (1, 2)
     )
     assert not np.array_equal(first.count_noise, second.count_noise)
+
+
+@pytest.mark.parametrize("keys", [{}, {"randomise": True}])
+def test_an_unknown_level_is_refused_at_once(keys):
+    with pytest.raises(ValueError, match=r"^unknown noise 'loud'; available: none,"):
+        Conditions("loud", **keys)
 
 
 def test_what_makes_no_sense_is_refused():

@@ -65,6 +65,7 @@ def test_the_library_finds_nothing_wrong(robot, arena):
     [
         {"noise": "calibrated"},
         {"noise": "strong", "randomise": True},
+        {"noise": "calibrated", "randomise_all": True},
         {"noise": "calibrated", "calibration": Calibration(track=0.05)},
         {"latency": 3},
         {"fitness": "literal", "sensor_range": 0.06, "v_max": 0.1, "w_max": 2.0},
@@ -269,6 +270,8 @@ def test_a_fitness_of_ones_own_is_the_reward(tmp_path):
         ({"noise": 1}, "noise: expected a text, got 1"),
         ({"randomise": True}, "randomise needs noise: calibrated or strong, got none"),
         ({"randomise": 1}, "randomise: expected True or False, got 1"),
+        ({"randomise_all": 0}, "randomise_all: expected True or False, got 0"),
+        ({"randomise_all": True}, "randomise_all needs noise: calibrated or strong"),
         ({"calibration": "no.yaml", "noise": "strong"}, "no.yaml"),
         ({"calibration": 4}, "calibration: expected a path, got 4"),
         ({"latency": -1}, "latency: expected a whole number from 0 to 1,000"),

@@ -1,5 +1,6 @@
 """The kinematic rung: against MuJoCo's geometry, equations of motion, and the loop."""
 
+import ast
 import errno
 import os
 import re
@@ -422,6 +423,36 @@ def test_every_processor_gives_the_same_bits(robot):
     ]
     assert runs[0].count("\n") > 3
     assert runs[0] == runs[1]
+
+
+def from_elsewhere(file: Path) -> set[str]:
+    """Modules of ours from which compiled functions of a file have names."""
+    tree = ast.parse(file.read_text())
+    origins = {
+        name.asname or name.name: each.module
+        for each in tree.body
+        if isinstance(each, ast.ImportFrom) and each.module
+        for name in each.names
+    }
+    used = {
+        name.id
+        for function in tree.body
+        if isinstance(function, ast.FunctionDef)
+        and any("compiled" in ast.unparse(each) for each in function.decorator_list)
+        for name in ast.walk(function)
+        if isinstance(name, ast.Name)
+    }
+    modules = {origins[name] for name in used & set(origins)}
+    return {name for name in modules if name.startswith("epuck_mj.")}
+
+
+def test_compiled_code_is_kept_by_all_that_it_uses():
+    """numba keeps the values of constants: a change elsewhere would go unnoticed."""
+    package = Path(compiling.__file__).parents[3]
+    found = set().union(*map(from_elsewhere, compiling.SOURCES))
+    assert "epuck_mj.step.bodies" in found
+    files = {package / f"{name.replace('.', '/')}.py" for name in found}
+    assert files <= set(compiling.SOURCES)
 
 
 def test_code_that_cannot_be_kept_is_compiled_again(monkeypatch):

@@ -37,7 +37,7 @@ def here(tmp_path, monkeypatch):
     Path("tiny").write_text(TINY)
     for name, text in EXPERIMENTS.items():
         Path(f"{name}.yaml").write_text(text)
-    monkeypatch.setattr(module, "QUICK", (("tiny", "1-2"),))
+    monkeypatch.setattr(module, "QUICK", ("tiny", "1-2"))
     return tmp_path
 
 

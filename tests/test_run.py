@@ -37,7 +37,12 @@ from evolution.run.history import HISTORY, Record
 from evolution.run.lock import LOCK
 from evolution.run.progress import Progress
 from evolution.settings.config import ExperimentConfig
-from evolution.settings.config_files import CONFIGS, find_config, load_config
+from evolution.settings.config_files import (
+    CONFIGS,
+    find_config,
+    load_config,
+    shipped_experiments,
+)
 from tests.no_pictures import draw_nothing
 from tests.processes import PATIENCE, python_process
 from tests.shipped import OPTIMIZERS
@@ -408,6 +413,11 @@ def test_help_ends_well(capsys):
         evolve(["ga", "--help"])
     assert not info.value.code
     assert "--tournament" in capsys.readouterr().out
+
+
+def test_help_names_every_experiment():
+    named = (run_command.Options.__doc__ or "").partition("(")[2].partition(") or")[0]
+    assert {each.strip() for each in named.split(",")} == set(shipped_experiments())
 
 
 def test_resume_of_a_finished_run_changes_nothing(finished, here, capsys):

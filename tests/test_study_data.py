@@ -9,12 +9,13 @@ from pathlib import Path
 import pytest
 
 from epuck_mj.errors import UserError
+from epuck_mj.host.csv_text import csv_columns
 from evolution.pages.blocks import to_html
 from evolution.report.page import report_blocks
 from evolution.report.run_table import run_rows
 from evolution.report.sections.how_to_get_every_number_again import origins
 from evolution.reproduce.reproduction import reproduction
-from evolution.run.history import read_history
+from evolution.run.history import Record, history_text, read_history
 from evolution.study.data import load_study
 from evolution.study.directory import StudyDirectory
 from evolution.study.packing import pack
@@ -163,6 +164,14 @@ def test_a_damaged_history_is_named(path, row):
     file.write_text(file.read_text() + row + "\n")
     with pytest.raises(UserError, match="is damaged"):
         read_history(file)
+
+
+def test_a_robot_with_a_comma_keeps_its_name(path):
+    file = path / "running" / "ga" / "seed-1" / "history.csv"
+    record = Record(0, 150, 1.5, 0.1, 0.25, 1, 0.0)
+    file.write_text(history_text([record], 'my "own", robot'))
+    assert csv_columns(file.read_text())["robot"] == ['my "own", robot']
+    assert read_history(file)["mean"] == [0.1]
 
 
 def test_a_copied_run_does_not_count_twice(path):

@@ -29,8 +29,8 @@ from epuck_mj.rungs.kinematic.plan import Plan
 from epuck_mj.rungs.kinematic.robots import at_rest, sensed
 from epuck_mj.step.motors import STEP_ANGLE
 from epuck_mj.step.sensors import (
+    COUNT_NOISE,
     LOG_COUNTS,
-    NOISE,
     NOISE_DISTANCES,
     PROXIMITY_DISTANCES,
     sensed_distance,
@@ -287,7 +287,7 @@ class DriveModel:
         silent = ((used <= FAR) & (left > 0)) | ((used >= SATURATED) & (left < 0))
         silent |= np.isnan(counts)
         known = sensed_distance(used, np.exp(gains))
-        noise = np.interp(known, NOISE_DISTANCES, NOISE) / used
+        noise = np.interp(known, NOISE_DISTANCES, COUNT_NOISE) / used
         speed = np.gradient(poses, self.time, axis=0)
         closing = np.einsum("kip,kp->ki", slopes, speed)
         aged = AGE_SPREAD * closing * steepness

@@ -17,7 +17,7 @@ from epuck_mj.step.elementary import exp, interpolate, log
 PROXIMITY_DISTANCES = np.array(list(PROXIMITY_COUNTS))
 LOG_COUNTS = log(np.array(list(PROXIMITY_COUNTS.values())))
 NOISE_DISTANCES = np.array(list(PROXIMITY_COUNT_NOISE))
-NOISE = np.array(list(PROXIMITY_COUNT_NOISE.values()))
+COUNT_NOISE = np.array(list(PROXIMITY_COUNT_NOISE.values()))
 
 PROXIMITY_REACH = float(PROXIMITY_DISTANCES[-1])
 """Farthest distance at which counts were measured [m]: beyond, sensors see nothing."""
@@ -75,7 +75,7 @@ def counted(
     Source: `PROXIMITY_COUNT_NOISE`, linear in between.
     """
     far = np.where(distance < 0, NOISE_DISTANCES[-1], distance)
-    deviation = interpolate(far, NOISE_DISTANCES, NOISE)
+    deviation = interpolate(far, NOISE_DISTANCES, COUNT_NOISE)
     counts = np.rint(proximity(distance, gains) + noise * deviation)
     return np.clip(counts, 0, PROXIMITY_COUNT_MAX)
 

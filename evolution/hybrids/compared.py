@@ -8,12 +8,11 @@ import numpy as np
 
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.report import samples
-from evolution.report.sections.comparisons import MARGIN
+from evolution.report.sections.comparisons import EQUIVALENCE_MARGIN
 from evolution.search.lifetime_learning import LifetimeLearningParameters
 from evolution.statistics.equivalence import Equivalence, equivalence
 from evolution.statistics.significance import (
     FEWEST_FOR_STARS,
-    LEVELS,
     holm,
     mann_whitney,
 )
@@ -57,9 +56,7 @@ class Compared:
         """Better, worse, equivalent, undecided; or that there are too few runs."""
         if self.runs < FEWEST_FOR_STARS:
             return "too few runs"
-        if self.p < LEVELS[0]:
-            return "better" if self.shift.shift > 0 else "worse"
-        return "equivalent" if self.shift.p < LEVELS[0] else "undecided"
+        return self.shift.verdict(self.p)
 
 
 def against_base(data: StudyData) -> list[Compared]:
@@ -153,7 +150,7 @@ def _family(data: StudyData, pairs: Sequence[tuple[str, str]]) -> list[Compared]
         (data.held_out(a, WHEELED_ROBOT), data.held_out(b, WHEELED_ROBOT))
         for a, b in pairs
     ]
-    margin = MARGIN * data.steps
+    margin = EQUIVALENCE_MARGIN * data.steps
     shifts = [equivalence(a, b, margin) for a, b in samples]
     alike = holm(np.array([shift.p for shift in shifts])).tolist()
     differ = holm(np.array([mann_whitney(a, b).p for a, b in samples])).tolist()

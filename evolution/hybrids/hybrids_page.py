@@ -98,7 +98,7 @@ def verdicts_table(data: StudyData, family: Sequence[Compared]) -> Table:
                 label(data, each.name),
                 label(data, each.other),
                 str(each.runs),
-                _shift(each),
+                str(each.shift),
                 probability(each.p).removeprefix("= "),
                 probability(each.shift.p).removeprefix("= "),
                 each.verdict,
@@ -106,11 +106,6 @@ def verdicts_table(data: StudyData, family: Sequence[Compared]) -> Table:
             for each in family
         ],
     )
-
-
-def _shift(each: Compared) -> str:
-    found = each.shift
-    return f"{found.shift:z.1f} [{found.low:z.1f}, {found.high:z.1f}]"
 
 
 def sweep_table(data: StudyData) -> Table:

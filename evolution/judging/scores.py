@@ -11,11 +11,11 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, Field, ValidationError
 
-from epuck_mj.errors import UserError
 from epuck_mj.policies.file import ControllerFile, load_controller
 from epuck_mj.scene.model_files import is_on_wheels
 from epuck_mj.step.fitness import of_most
 from evolution.settings.config_fields import within
+from evolution.settings.file_fields import damaged
 
 Score = Annotated[float, within("score")]
 
@@ -35,10 +35,7 @@ class _Record(BaseModel, frozen=True, allow_inf_nan=False):
         try:
             return cls.model_validate(fields)
         except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"])) or "scores"
-            what = first["msg"].removeprefix("Value error, ")
-            raise UserError(f"'{path}' is damaged: {where}: {what}") from None
+            raise damaged(path, error) from None
 
     def to_dict(self) -> dict[str, Any]:
         """The known values, in the order of the attributes."""

@@ -15,7 +15,7 @@ from evolution.pages.words import (
 )
 from evolution.report.samples import FOLLOWED, known
 from evolution.report.sections.comparisons import (
-    MARGIN,
+    EQUIVALENCE_MARGIN,
     Comparison,
     comparisons_of,
     numbers,
@@ -61,11 +61,11 @@ def claims(study: StudyData) -> list[Claim]:
     stored = samples_of(study, study.best_stored)
     shares = samples_of(study, lambda name: 100 * mean_to_best(study, name))
     where = "in the mean's share of the best [%]"
-    in_shares = _orders(_pairs(study, shares, 100 * MARGIN), shares, where)
+    in_shares = _orders(_pairs(study, shares, 100 * EQUIVALENCE_MARGIN), shares, where)
     early = samples_of(study, lambda name: 100 * maturity(study, name))
     found = [
         *_orders(
-            _pairs(study, stored, MARGIN * study.steps),
+            _pairs(study, stored, EQUIVALENCE_MARGIN * study.steps),
             stored,
             "in best (stored) fitness",
         ),
@@ -92,7 +92,7 @@ def claims(study: StudyData) -> list[Claim]:
 def held_out_pairs(study: StudyData, robot: str) -> list[Comparison]:
     """The paper's algorithms against each other in held-out fitness on a robot."""
     held_out = samples_of(study, lambda name: study.held_out(name, robot))
-    return _pairs(study, held_out, MARGIN * study.steps)
+    return _pairs(study, held_out, EQUIVALENCE_MARGIN * study.steps)
 
 
 def held_out_order(study: StudyData, robot: str) -> list[Claim]:

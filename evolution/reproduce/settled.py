@@ -16,7 +16,7 @@ from evolution.reproduce.verdicts import (
     INCONSISTENT,
     NOT_CONTRADICTED,
 )
-from evolution.statistics.equivalence import CONFIDENCE
+from evolution.statistics.equivalence import SHIFT_CONFIDENCE
 from evolution.statistics.estimates import Interval
 from evolution.statistics.significance import LEVELS
 from evolution.study.data import StudyData
@@ -127,7 +127,7 @@ def runs_needed(pair: Comparison) -> int | None:
         return None
     normal = NormalDist()
     level = normal.inv_cdf(1 - LEVELS[0] / pair.family) + normal.inv_cdf(POWER)
-    standard_error = half / normal.inv_cdf(0.5 + CONFIDENCE / 2)
+    standard_error = half / normal.inv_cdf(0.5 + SHIFT_CONFIDENCE / 2)
     needed = max(n + 1, math.ceil(n * (level * standard_error / away) ** 2))
     # rounded up to two digits
     step = 10 ** max(0, len(str(needed)) - 2)

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
-from epuck_mj.errors import UserError
 from epuck_mj.host.yaml_and_json import read_json
+from evolution.settings.file_fields import check_fields
 
 if TYPE_CHECKING:
     from epuck_mj.scene.model import Scene
@@ -125,20 +125,6 @@ def check_provenance(fields: Mapping[str, Any], path: Path) -> None:
         UserError: if a value is something else.
     """
     check_fields(_Provenance, fields, path)
-
-
-def check_fields(kind: type[BaseModel], fields: Mapping[str, Any], path: Path) -> None:
-    """Refuse fields of a file that are not of a kind.
-
-    Raises:
-        UserError: naming the first value that is something else.
-    """
-    try:
-        kind.model_validate(fields)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise UserError(f"'{path}' is damaged: {where}: {first['msg']}") from None
 
 
 def now() -> str:

@@ -12,8 +12,9 @@ from typing import Self
 import numpy as np
 
 from evolution.statistics.estimates import checked_sample
+from evolution.statistics.significance import LEVELS
 
-CONFIDENCE = 0.9
+SHIFT_CONFIDENCE = 0.9
 """Of the interval of the shift: it lies within the margin where p is below 0.05."""
 
 
@@ -38,6 +39,21 @@ class Equivalence:
     def turned(self) -> Self:
         """The same test with the second sample first."""
         return replace(self, shift=-self.shift, low=-self.high, high=-self.low)
+
+    def verdict(self, p: float) -> str:
+        """The first sample is better or worse than the second; or both are equivalent.
+
+        Args:
+            p: of a difference; if the comparison is one of a family, adjusted for it,
+                as that of the equivalence.
+        """
+        if p < LEVELS[0]:
+            return "better" if self.shift > 0 else "worse"
+        return "equivalent" if self.p < LEVELS[0] else "undecided"
+
+    def __str__(self) -> str:
+        """The shift and its interval."""
+        return f"{self.shift:z.1f} [{self.low:z.1f}, {self.high:z.1f}]"
 
 
 def equivalence(a: np.ndarray, b: np.ndarray, margin: float) -> Equivalence:
@@ -64,7 +80,7 @@ def equivalence(a: np.ndarray, b: np.ndarray, margin: float) -> Equivalence:
     differences = np.sort(np.subtract.outer(a, b), axis=None)
     n, m = a.size, b.size
     deviation = math.sqrt(n * m * (n + m + 1) / 12)
-    outside = n * m / 2 - stats.norm.ppf(0.5 + CONFIDENCE / 2) * deviation
+    outside = n * m / 2 - stats.norm.ppf(0.5 + SHIFT_CONFIDENCE / 2) * deviation
     # number of differences beyond each bound
     k = max(0, math.floor(outside))
     return Equivalence(

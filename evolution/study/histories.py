@@ -20,7 +20,7 @@ from evolution.run.history import (
     table_text,
 )
 
-Run = tuple[str, int]
+RunKey = tuple[str, int]
 """Experiment and seed."""
 
 COUNTED = ("control_steps", "crash_rate")
@@ -101,7 +101,7 @@ def _of_generations(timing: Path, column: str) -> dict[int, float]:
     return found
 
 
-def history_table(histories: Mapping[Run, History]) -> pa.Table:
+def history_table(histories: Mapping[RunKey, History]) -> pa.Table:
     """The table of some runs' histories."""
     parts = [_part(*run, history) for run, history in histories.items()]
     return pa.concat_tables([SCHEMA.empty_table(), *parts])
@@ -122,7 +122,7 @@ def _part(experiment: str, seed: int, history: History) -> pa.Table:
     return pa.Table.from_arrays(arrays, schema=SCHEMA)
 
 
-def histories_in(table: pa.Table) -> dict[Run, History]:
+def histories_in(table: pa.Table) -> dict[RunKey, History]:
     """The histories of a sorted table, by run.
 
     Raises:
@@ -132,7 +132,7 @@ def histories_in(table: pa.Table) -> dict[Run, History]:
         name: table[name].to_numpy() for name in table.column_names if name != ROBOT
     }
     robots = np.asarray(table[ROBOT].to_pylist())
-    found: dict[Run, History] = {}
+    found: dict[RunKey, History] = {}
     for part in slices(table):
         first = part.start
         history = {
@@ -165,7 +165,7 @@ def codes(column: pa.ChunkedArray) -> np.ndarray:
 
 
 def merged(
-    parts: Sequence[pa.Table], kept: Collection[Run], order: Sequence[str]
+    parts: Sequence[pa.Table], kept: Collection[RunKey], order: Sequence[str]
 ) -> pa.Table:
     """The rows of the runs to be kept, by experiment, seed and generation.
 
@@ -187,7 +187,7 @@ def merged(
     return whole.take(pa.array(np.lexsort(keys)))
 
 
-def _runs(table: pa.Table) -> list[Run]:
+def _runs(table: pa.Table) -> list[RunKey]:
     """The run of each row."""
     names: Iterable[str] = table["experiment"].to_pylist()
     return list(zip(names, table["seed"].to_pylist(), strict=True))

@@ -11,7 +11,7 @@ from epuck_mj.host import files
 from evolution.run.directory import RunDirectory
 from evolution.run.lock import LOCK, locked
 from evolution.study.directory import PATIENCE, RUNNING, StudyDirectory
-from evolution.study.histories import Run
+from evolution.study.histories import RunKey
 from evolution.study.jobs import failure_log
 from evolution.study.packed_run import PackedRun, read_packed
 
@@ -50,9 +50,9 @@ def pack(study: StudyDirectory) -> Packing:
         files.remove_leftovers(study.path)
         config, tables = study.stored_config(), study.tables
         known = tables.packed()
-        found: dict[Run, PackedRun] = {}
+        found: dict[RunKey, PackedRun] = {}
         ready: list[RunDirectory] = []
-        others: list[tuple[Run, RunDirectory]] = []
+        others: list[tuple[RunKey, RunDirectory]] = []
         left: list[str] = []
         for name in config.experiments:
             for seed, directory in study.runs(name):

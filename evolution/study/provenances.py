@@ -17,7 +17,8 @@ from pydantic import BaseModel
 
 from epuck_mj.host import files
 from epuck_mj.host.yaml_and_json import read_json
-from evolution.run.provenance import check_fields, check_provenance
+from evolution.run.provenance import check_provenance
+from evolution.settings.file_fields import check_fields
 
 THREADS, COMMANDS = "threads", "commands"
 """What may differ between runs of one provenance: lists of all that were used.

@@ -17,7 +17,7 @@ from evolution.study.config import StudyConfig
 from evolution.study.histories import (
     SCHEMA,
     History,
-    Run,
+    RunKey,
     checked,
     histories_in,
     history_table,
@@ -44,7 +44,7 @@ class Tables:
         self.provenance = study / "provenance.json"
         self.timing = study / "timing.csv"
 
-    def packed(self) -> set[Run]:
+    def packed(self) -> set[RunKey]:
         """Experiment and seed of each run in the tables.
 
         Raises:
@@ -69,7 +69,7 @@ class Tables:
         except (ValueError, TypeError) as error:
             raise UserError(f"'{self.champions}' is damaged: {error}") from None
 
-    def histories(self) -> dict[Run, History]:
+    def histories(self) -> dict[RunKey, History]:
         """The histories of all runs.
 
         Raises:
@@ -81,7 +81,9 @@ class Tables:
         except ValueError as error:
             raise UserError(f"'{self.history}' is damaged: {error}") from None
 
-    def runs(self, config: StudyConfig, histories: bool = True) -> dict[Run, PackedRun]:
+    def runs(
+        self, config: StudyConfig, histories: bool = True
+    ) -> dict[RunKey, PackedRun]:
         """The runs of a study's experiments, in the order of the table.
 
         Args:
@@ -98,7 +100,7 @@ class Tables:
 
     def sound_runs(
         self, config: StudyConfig, histories: bool = True
-    ) -> tuple[dict[Run, PackedRun], dict[Run, UserError]]:
+    ) -> tuple[dict[RunKey, PackedRun], dict[RunKey, UserError]]:
         """The runs as `runs` gives them, and what is wrong with the rows of others.
 
         Raises:
@@ -107,8 +109,8 @@ class Tables:
         rows = self.rows()
         read = self.histories() if rows and histories else {}
         provenances, seconds = read_provenances(self.provenance), self.seconds()
-        found: dict[Run, PackedRun] = {}
-        damaged: dict[Run, UserError] = {}
+        found: dict[RunKey, PackedRun] = {}
+        damaged: dict[RunKey, UserError] = {}
         for row in rows:
             if ("experiment",) not in row or ("seed",) not in row:
                 raise UserError(f"'{self.champions}' is damaged: a row names no run")
@@ -175,7 +177,7 @@ class Tables:
         write_table(self.history, thinned(merged(parts, kept, list(rank))))
         write_table(self.champions, table_of([rows[run] for run in kept]))
 
-    def seconds(self) -> dict[Run, float]:
+    def seconds(self) -> dict[RunKey, float]:
         """Seconds of the generations of each run, as timing.csv has them.
 
         Raises:
@@ -196,10 +198,10 @@ TIMING = ("experiment", "seed", "seconds")
 """Columns of timing.csv."""
 
 
-def _write_seconds(path: Path, seconds: Mapping[Run, float]) -> None:
+def _write_seconds(path: Path, seconds: Mapping[RunKey, float]) -> None:
     lines = [f"{name},{seed},{time:.3f}\n" for (name, seed), time in seconds.items()]
     files.write_text(path, "".join([",".join(TIMING), "\n", *lines]))
 
 
-def _run(row: Row) -> Run:
+def _run(row: Row) -> RunKey:
     return row["experiment",], row["seed",]

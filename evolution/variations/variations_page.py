@@ -137,8 +137,7 @@ def _table(varied: Sequence[Varied], algorithm: str) -> Table:
 def _row(each: Varied) -> tuple[str, ...]:
     shift, p = NOTHING, NOTHING
     if each.against is not None:
-        found = each.against
-        shift = f"{found.shift:z.1f} [{found.low:z.1f}, {found.high:z.1f}]"
+        shift = str(each.against)
         p = probability(each.p).removeprefix("= ")
     return (
         in_words(each.change),
@@ -157,6 +156,4 @@ def _verdict(each: Varied) -> str:
     """What the runs say of a variation against the unchanged algorithm."""
     if each.against is None or not each.enough:
         return NOTHING
-    if each.differs:
-        return "better" if each.against.shift > 0 else "worse"
-    return "equivalent" if each.against.p < 0.05 else "undecided"
+    return each.against.verdict(each.p)

@@ -13,7 +13,7 @@ from evolution.pages.words import (
     REPLICATES,
 )
 from evolution.report.samples import crash_rates, tests_of
-from evolution.report.sections.comparisons import MARGIN
+from evolution.report.sections.comparisons import EQUIVALENCE_MARGIN
 from evolution.statistics.best_of_few import chance_of_best, chance_of_order
 from evolution.statistics.equivalence import Equivalence, equivalence
 from evolution.statistics.significance import (
@@ -142,7 +142,7 @@ def varied_of(studies: Sequence[StudyData]) -> list[Varied]:
     if not compared:
         return found
     shifts = [
-        equivalence(found[i].held_out, base.held_out, MARGIN * base.steps)
+        equivalence(found[i].held_out, base.held_out, EQUIVALENCE_MARGIN * base.steps)
         for i, base in compared
     ]
     p = [mann_whitney(found[i].held_out, base.held_out).p for i, base in compared]

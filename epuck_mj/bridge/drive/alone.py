@@ -4,7 +4,12 @@ import contextlib
 import sys
 from collections.abc import Callable
 
-from epuck_mj.bridge.drive.console import HEADING, drive_summary, live_line
+from epuck_mj.bridge.drive.console import (
+    HEADING,
+    QUIET_PERIOD,
+    drive_summary,
+    live_line,
+)
 from epuck_mj.bridge.drive.keyboard import Keyboard, keyboard
 from epuck_mj.bridge.drive.log import Show, show_log
 from epuck_mj.bridge.drive.mission import Mission, accomplish
@@ -13,9 +18,6 @@ from epuck_mj.bridge.drive.session import Step
 from epuck_mj.bridge.line.interfaces import Connection, Greeting
 from epuck_mj.host.interruption import Interruption
 from epuck_mj.host.output import Output, OutputLost, complain
-
-QUIET_PERIOD = 1.0
-"""Time between two status lines where output is no terminal [s]."""
 
 
 def drive_alone(

@@ -6,6 +6,9 @@ from epuck_mj.bridge.drive.robot import RealRobot
 from epuck_mj.bridge.drive.session import Session, Step
 from epuck_mj.step.fitness import of_most
 
+QUIET_PERIOD = 1.0
+"""Time between two status lines of a robot where output is no terminal [s]."""
+
 
 def live_line(step: Step, robot: RealRobot) -> str:
     """Status of a control step in less than 80 characters: counts, speeds, timing.

@@ -6,14 +6,11 @@ import sys
 import time
 from collections.abc import Sequence
 
-from epuck_mj.bridge.drive.console import FLEET_HEADING
+from epuck_mj.bridge.drive.console import FLEET_HEADING, QUIET_PERIOD
 from epuck_mj.host.output import Output, OutputLost
 
 PERIOD = 0.1
 """Time between two drawings of a terminal [s]."""
-
-QUIET_PERIOD = 1.0
-"""Time between two status lines of a robot where output is no terminal [s]."""
 
 
 class Screen:

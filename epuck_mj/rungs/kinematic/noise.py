@@ -18,8 +18,8 @@ from epuck_mj.rungs.kinematic.elementary import exp, interpolate
 from epuck_mj.step.disturbances import Disturbances
 from epuck_mj.step.motors import STEP_ANGLE
 from epuck_mj.step.sensors import (
+    COUNT_NOISE,
     LOG_COUNTS,
-    NOISE,
     NOISE_DISTANCES,
     PROXIMITY_DISTANCES,
     PROXIMITY_REACH,
@@ -98,7 +98,7 @@ def sensed(gains, table, share, count_noise, which, k, truth, before, distance):
             log = interpolate(aged, PROXIMITY_DISTANCES, LOG_COUNTS)
             counts = min(exp(log) * gains[which, i], PROXIMITY_COUNT_MAX)
         far = NOISE_DISTANCES[NOISE_DISTANCES.shape[0] - 1] if aged < 0.0 else aged
-        deviation = interpolate(far, NOISE_DISTANCES, NOISE)
+        deviation = interpolate(far, NOISE_DISTANCES, COUNT_NOISE)
         counts = np.rint(counts + count_noise[which, k, i] * deviation)
         counts = min(max(counts, 0.0), PROXIMITY_COUNT_MAX)
         distance[i] = table[i, np.int64(counts)]

@@ -66,7 +66,7 @@ class Comparison(Contest):
         )
 
 
-MARGIN = 1 / 30
+EQUIVALENCE_MARGIN = 1 / 30
 """Margin of equivalence as a share of the most that a trial can earn: 10 of 300."""
 
 
@@ -111,7 +111,7 @@ def _effect(a: np.ndarray, b: np.ndarray) -> Interval:
 def comparisons(data: StudyData) -> dict[str, list[Comparison]]:
     """Every comparison of a study, by measure."""
     return {
-        measure: comparisons_of(samples, data.alike, MARGIN * data.steps)
+        measure: comparisons_of(samples, data.alike, EQUIVALENCE_MARGIN * data.steps)
         for measure, samples in measures(data).items()
     }
 
