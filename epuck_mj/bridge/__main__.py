@@ -2,7 +2,6 @@
 
 import contextlib
 import gc
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,13 +21,13 @@ from epuck_mj.bridge.line.last_resort import leave_to_last_resort
 from epuck_mj.bridge.line.serial_port import ports
 from epuck_mj.constants import SPEED_MAX
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import main, parse, word
+from epuck_mj.host.command_line import main, parse, pose_flag, word
+from epuck_mj.host.limits import check_flag
 from epuck_mj.host.output import say
 from epuck_mj.policies.wall_follower import YARDSTICK
 from epuck_mj.trials.trajectory import Trajectory
 
 MODULE = "epuck_mj.bridge"
-SECONDS_MAX = 24 * 3600
 
 
 EXAMPLES = (
@@ -133,13 +132,12 @@ def _drive_fleet(options: Options, members: Sequence[Member]) -> int:
 
 def _order(options: Options, member: Member, name: Path) -> Order:
     """What a robot is to do."""
-    x, y, degrees = options.pose or (0.0, 0.0, 0.0)
     return Order(
         port=member.port,
         controller=member.controller,
         calibration=member.calibration,
         seconds=options.seconds,
-        start=(x, y, math.radians(degrees)),
+        start=pose_flag(options.pose) or (0.0, 0.0, 0.0),
         max_speed=options.max_speed,
         dry_run=options.dry_run,
         calibrate=options.calibrate,
@@ -190,17 +188,13 @@ def _refuse_bad_options(options: Options) -> None:
                 raise UserError(
                     f"expected --{flag} with one robot; robots of a fleet differ"
                 )
-    if not 0 < options.seconds <= SECONDS_MAX:
-        raise UserError(
-            f"expected --seconds above 0, up to {SECONDS_MAX}, got {options.seconds}"
-        )
+    check_flag("seconds", options.seconds)
     if options.max_speed is not None and not 0 < options.max_speed <= SPEED_MAX:
         raise UserError(
             f"expected --max-speed above 0, up to {SPEED_MAX:.4f} m/s, "
             f"got {options.max_speed}"
         )
-    if not all(map(math.isfinite, options.pose or ())):
-        raise UserError(f"expected --pose of finite numbers, got {options.pose}")
+    pose_flag(options.pose)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import tyro
 
 from epuck_mj.constants import N_PROXIMITY, WHEEL_RADIUS
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import parse, word
+from epuck_mj.host.command_line import parse, pose_flag, word
 from epuck_mj.host.files import check_writable, is_file
 from epuck_mj.host.output import say
 from epuck_mj.step.calibration import Calibration
@@ -49,8 +49,7 @@ def fit(argv: Sequence[str]) -> int:
     options = parse(FitOptions, prog, argv, examples=EXAMPLES)
     if options.log is None:
         raise UserError("expected the log of a drive, as fit drive.npz")
-    if options.pose is not None and not all(map(math.isfinite, options.pose)):
-        raise UserError(f"expected --pose of finite numbers, got {options.pose}")
+    start = pose_flag(options.pose)
     check_writable(options.output)
     output = options.output
     known = Calibration.load(output) if is_file(output) else Calibration()
@@ -62,11 +61,7 @@ def fit(argv: Sequence[str]) -> int:
     from epuck_mj.scene.model import load_scene
     from epuck_mj.scene.model_files import KINEMATIC_ROBOT
 
-    start = None
-    if options.pose is not None:
-        x, y, degrees = options.pose
-        start = np.array([x, y, math.radians(degrees)])
-    drive = load_drive(options.log, start)
+    drive = load_drive(options.log, None if start is None else np.array(start))
     scene = load_scene(KINEMATIC_ROBOT, options.arena)
     found = fit_drive(drive, scene, known)
     say(report(drive, known, found))

@@ -6,7 +6,8 @@ import mujoco
 import numpy as np
 
 from epuck_mj.constants import PROXIMITY_RANGE
-from epuck_mj.scene.geometry import box_around, boxes, kinematics
+from epuck_mj.scene.boxes import box_around, boxes
+from epuck_mj.scene.geometry import kinematics
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.robot_parts import SHELL
 

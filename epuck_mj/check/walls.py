@@ -9,9 +9,10 @@ from scipy.spatial import ConvexHull, QhullError
 from epuck_mj.check.findings import Finding, Place, error, info, names, warning
 from epuck_mj.check.heights import Heights, extent, extents, mm
 from epuck_mj.check.source import Places
+from epuck_mj.scene.boxes import at_rest
 from epuck_mj.scene.clearance import MEASURED
 from epuck_mj.scene.floor import floors
-from epuck_mj.scene.geometry import at_rest, box_around_walls, mesh, seen_by_rays, walls
+from epuck_mj.scene.geometry import box_around_walls, mesh, seen_by_rays, walls
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.outline import geom_outlines, within
 from epuck_mj.scene.robot_parts import SHELL, can_touch, of_robot, static

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import math
 import re
 import shlex
 import signal
@@ -46,6 +47,25 @@ PART = PrimitiveConstructorSpec(
 def word(metavar: str) -> Any:
     """The marker of a flag whose help shows that word for its value."""
     return tyro.conf.arg(metavar=metavar)
+
+
+def pose_flag(
+    given: tuple[float, float, float] | None,
+) -> tuple[float, float, float] | None:
+    """The pose of --pose: x and y [m], heading [rad]; None if none was given.
+
+    Args:
+        given: x and y [m] and heading [degrees].
+
+    Raises:
+        UserError: if a number is not finite.
+    """
+    if given is None:
+        return None
+    if not all(map(math.isfinite, given)):
+        raise UserError(f"expected --pose of finite numbers, got {given}")
+    x, y, degrees = given
+    return x, y, math.radians(degrees)
 
 
 def parse(

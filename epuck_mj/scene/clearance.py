@@ -13,7 +13,8 @@ import mujoco
 import numpy as np
 
 from epuck_mj.errors import UserError
-from epuck_mj.scene.geometry import boxes, walls
+from epuck_mj.scene.boxes import boxes
+from epuck_mj.scene.geometry import walls
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.nearest import CLEARANCE_MAX, NearestWall, at_start
 from epuck_mj.scene.robot_parts import SHELL

@@ -10,6 +10,7 @@ import numpy as np
 
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
+from epuck_mj.scene.boxes import at_rest
 from epuck_mj.scene.robot_parts import PREFIX, PROXIMITY
 
 LEFT, RIGHT = ([f"{name}_{side}" for name in PROXIMITY] for side in ("left", "right"))
@@ -64,8 +65,7 @@ def cosines_of(model: mujoco.MjModel, names: list[str], robot: Path) -> np.ndarr
     """
     if len(names) == N_PROXIMITY:
         return np.zeros(0)
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    data = at_rest(model)
     sites = [model.sensor(name).objid[0] for name in names]
     place = data.site_xpos[sites].reshape(3, N_PROXIMITY, 3)
     direction = data.site_xmat[sites][:, [2, 5, 8]].reshape(3, N_PROXIMITY, 3)

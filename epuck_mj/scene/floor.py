@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from epuck_mj.errors import UserError
+from epuck_mj.scene.boxes import at_rest, box_around
 from epuck_mj.scene.robot_parts import SHELL, can_touch, of_robot, static
 
 FLOOR_BITS = 2
@@ -104,8 +105,7 @@ def level_tops(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
         Heights of their tops [m], NaN for all other geoms, and their areas [m^2],
         `(ngeom,)` both.
     """
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    data = at_rest(model)
     rotation, every = data.geom_xmat.reshape(-1, 3, 3), np.arange(model.ngeom)
     # of a box, any side may be up
     up = np.abs(rotation[:, 2, :]).argmax(axis=1)
@@ -153,14 +153,5 @@ def check_floor(model: mujoco.MjModel, height: float, arena: Path) -> None:
 
 def _area(model: mujoco.MjModel) -> float:
     """Area that the still geoms of an arena take, seen from above [m^2]."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    some = static(model) & ~of_robot(model)
-    some &= model.geom_type != _SHAPE.mjGEOM_PLANE
-    if not some.any():
-        return 0.0
-    rotation, box = data.geom_xmat[some].reshape(-1, 3, 3), model.geom_aabb[some]
-    center = data.geom_xpos[some] + np.einsum("nij,nj->ni", rotation, box[:, :3])
-    half = np.einsum("nij,nj->ni", np.abs(rotation), box[:, 3:])
-    size = (center + half).max(axis=0) - (center - half).min(axis=0)
-    return float(size[0] * size[1])
+    box = box_around(model, static(model) & ~of_robot(model))
+    return 0.0 if box is None else float(np.prod((box[1] - box[0])[:2]))

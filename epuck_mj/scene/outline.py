@@ -3,7 +3,8 @@
 import mujoco
 import numpy as np
 
-from epuck_mj.scene.geometry import at_rest, mesh, walls
+from epuck_mj.scene.boxes import at_rest
+from epuck_mj.scene.geometry import mesh, walls
 from epuck_mj.scene.model import Scene
 from epuck_mj.scene.robot_parts import SHELL
 

@@ -15,7 +15,7 @@ import numpy as np
 import tyro
 
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import main, parse, word
+from epuck_mj.host.command_line import main, parse, pose_flag, word
 from epuck_mj.host.files import is_file
 from epuck_mj.host.limits import check_flag
 from epuck_mj.host.yaml_and_json import read_yaml
@@ -130,12 +130,9 @@ def _starts(scene: "Scene", options: Options) -> Iterator[np.ndarray]:
     Raises:
         UserError: if the arena has no room, or the pose is not one.
     """
-    if options.pose is not None:
-        pose = np.array(options.pose)
-        if not np.isfinite(pose).all():
-            raise UserError(f"expected --pose of three numbers, got {options.pose}")
-        pose[2] = np.radians(pose[2])
-        return itertools.repeat(pose)
+    pose = pose_flag(options.pose)
+    if pose is not None:
+        return itertools.repeat(np.array(pose))
     from epuck_mj.scene.starts import FreeSpace
 
     space, rng = FreeSpace(scene, START_CLEARANCE), np.random.default_rng(options.seed)

@@ -13,9 +13,10 @@ import numpy as np
 
 from epuck_mj.bridge.fake.scenarios import random_scenario, scenario
 from epuck_mj.errors import UserError
-from epuck_mj.host.command_line import main, parse, word
+from epuck_mj.host.command_line import main, parse, pose_flag, word
 from epuck_mj.host.files import check_writable
 from epuck_mj.host.interruption import Interrupted, Interruption
+from epuck_mj.host.limits import check_flag
 from epuck_mj.host.output import Output
 
 MODULE = "epuck_mj.bridge.fake"
@@ -82,13 +83,12 @@ def fake(argv: Sequence[str]) -> int:
         else scenario(options.scenario)
     )
     scene = load_scene(options.robot, options.arena)
-    x, y, degrees = options.pose
     origin = time.monotonic()
 
     def clock() -> float:
         return (time.monotonic() - origin) * options.speed
 
-    body = SimulatedBody(scene, np.array([x, y, math.radians(degrees)]), clock())
+    body = SimulatedBody(scene, np.array(pose_flag(options.pose)), clock())
     robot = options.firmware if options.wifi is None else WIFI
     tcp = options.tcp if options.wifi is None else options.wifi
     emulator = Emulator(body, robot, clock(), faults, options.latency, options.seed)
@@ -126,10 +126,8 @@ def _refuse_bad_options(options: Options) -> None:
         raise UserError(f"expected --speed above 0, up to 1000, got {options.speed}")
     if not 0 <= options.latency <= 1:
         raise UserError(f"expected --latency from 0 to 1 s, got {options.latency}")
-    if options.seed < 0:
-        raise UserError(f"expected --seed of 0 or more, got {options.seed}")
-    if not all(map(math.isfinite, options.pose)):
-        raise UserError(f"expected --pose of finite numbers, got {options.pose}")
+    check_flag("seed", options.seed)
+    pose_flag(options.pose)
 
 
 if __name__ == "__main__":

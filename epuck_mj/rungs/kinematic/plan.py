@@ -8,7 +8,8 @@ import numpy as np
 from epuck_mj.constants import N_PROXIMITY
 from epuck_mj.errors import UserError
 from epuck_mj.rungs.kinematic.cut import UPRIGHT, NoOutline, Outlines, add_outline
-from epuck_mj.scene.geometry import at_rest, kinematics, seen_by_rays, walls
+from epuck_mj.scene.boxes import at_rest
+from epuck_mj.scene.geometry import kinematics, seen_by_rays, walls
 from epuck_mj.scene.model import Scene, once_per_model
 from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL, WHEELS, static
 from epuck_mj.step.bodies import SPARE_SPEED

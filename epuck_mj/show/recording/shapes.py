@@ -4,14 +4,8 @@ import mujoco
 import numpy as np
 import rerun as rr
 
-from epuck_mj.scene.geometry import (
-    arena_box,
-    at_rest,
-    color,
-    drawn,
-    mesh,
-    moving_bodies,
-)
+from epuck_mj.scene.boxes import at_rest
+from epuck_mj.scene.geometry import arena_box, color, drawn, mesh, moving_bodies
 from epuck_mj.scene.robot_parts import PREFIX, ROBOT_BODY
 from epuck_mj.show.recording.entities import ARENA, Entities
 
