@@ -546,7 +546,11 @@ def test_a_worker_and_then_the_scheduler_of_a_study_are_killed(
 def workers_of(pid: int) -> list[int]:
     """Process ids of a local cluster's workers, which its process has started."""
     threads = Path(f"/proc/{pid}/task").iterdir()
-    children = " ".join((thread / "children").read_text() for thread in threads)
+    children = ""
+    for thread in threads:
+        # it may have ended meanwhile
+        with suppress(OSError):
+            children += f" {(thread / 'children').read_text()}"
     found = []
     for child in children.split():
         with suppress(OSError):

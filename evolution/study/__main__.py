@@ -9,7 +9,7 @@ from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from tqdm import tqdm
@@ -29,6 +29,9 @@ from evolution.settings.memory import check_needs
 from evolution.study.config import StudyConfig, find_study, parse_seeds
 from evolution.study.directory import PATIENCE, StudyDirectory
 from evolution.study.jobs import Event, Job, carry_out_side_by_side
+
+if TYPE_CHECKING:
+    from evolution.study.packing import Packer
 
 MODULE = "evolution.study"
 
@@ -82,6 +85,45 @@ def study(argv: Sequence[str]) -> int:
         UserError: for anything the user can put right.
     """
     options = parse(Options, f"python -m {MODULE}", argv, examples=EXAMPLES)
+    config, seeds = _checked(options)
+    directory = StudyDirectory(options.output)
+    directory.open(config, seeds)
+    # pyarrow is slow to import: after the checks of the command line
+    from evolution.study.packing import Packer
+
+    # pack runs of killed processes and of older versions
+    packer = Packer(directory)
+    packer.now()
+    everything = _jobs(config, seeds, directory, tuple(argv))
+    started = time.monotonic()
+    with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:
+        try:
+            with interruption.raising():
+                failed = _carry_out(everything, directory, packer, options)
+        except Interrupted:
+            try:
+                packer.now()
+            except UserError as error:
+                print(f"finished runs are in no table yet: {error}", file=sys.stderr)
+            again = shell_command(MODULE, *argv)
+            print(f"Interrupted; continue with: {again}", file=sys.stderr)
+            return interruption.status
+    done = len(everything) - len(failed)
+    minutes = (time.monotonic() - started) / 60
+    print(f"{done} of {len(everything)} runs are finished, {minutes:.1f} min")
+    if failed:
+        print(f"failed: {', '.join(map(str, failed))}", file=sys.stderr)
+    if done:
+        print(f"Report: {shell_command('evolution.report', directory.path)}")
+    return 1 if failed else 0
+
+
+def _checked(options: Options) -> tuple[StudyConfig, Sequence[int]]:
+    """The experiments and seeds that the options ask for.
+
+    Raises:
+        UserError: if the options exclude each other, or name what is not there.
+    """
     check_flag("jobs", options.jobs)
     if options.split and options.cluster is None:
         raise UserError("expected --cluster with --split, got --split alone")
@@ -102,17 +144,20 @@ def study(argv: Sequence[str]) -> int:
         find_arena(each.arena)
         if options.cluster is None:
             check_needs(each)
-    directory = StudyDirectory(options.output)
-    directory.open(config, seeds)
-    # pyarrow is slow to import: after the checks of the command line
-    from evolution.study.packing import Packer
+    return config, seeds
 
-    # pack runs of killed processes and of older versions
-    packer = Packer(directory)
-    packer.now()
-    typed, there = tuple(argv), directory.tables.packed()
-    # seed by seed, so that an interrupted study has the same seeds of all experiments
-    everything = [
+
+def _jobs(
+    config: StudyConfig,
+    seeds: Sequence[int],
+    directory: StudyDirectory,
+    typed: tuple[str, ...],
+) -> list[Job]:
+    """All runs of a study, finished ones too.
+
+    Seed by seed, so that an interrupted study has the same seeds of all experiments.
+    """
+    return [
         Job(
             name,
             config.with_seed(name, seed),
@@ -123,44 +168,35 @@ def study(argv: Sequence[str]) -> int:
         for seed in seeds
         for name in config.experiments
     ]
+
+
+def _carry_out(
+    everything: Sequence[Job],
+    directory: StudyDirectory,
+    packer: "Packer",
+    options: Options,
+) -> list[Job]:
+    """Do the runs that are not finished, and pack them; those that failed."""
+    # first, so that an interrupted study has it, too
+    try:
+        _measure_yardstick(directory)
+    except UserError as error:
+        print(f"{YARDSTICK} could not be tested: {error}", file=sys.stderr)
+    there = directory.tables.packed()
     jobs = [
         job
         for job in everything
         if (job.name, job.config.seed) not in there and not job.run.finished
     ]
-    started = time.monotonic()
-    failed: list[Job] = []
-    with Interruption(signal.SIGINT, signal.SIGTERM) as interruption:
-        try:
-            with interruption.raising():
-                # first, so that an interrupted study has it, too
-                try:
-                    _measure_yardstick(directory)
-                except UserError as error:
-                    print(f"{YARDSTICK} could not be tested: {error}", file=sys.stderr)
-                with closing(_events(jobs, options)) as events:
-                    for event in _shown(everything, jobs, events):
-                        if event.failure is not None:
-                            failed.append(event.job)
-                        elif event.ended:
-                            packer.when_due()
-                packer.finish()
-        except Interrupted:
-            try:
-                packer.now()
-            except UserError as error:
-                print(f"finished runs are in no table yet: {error}", file=sys.stderr)
-            again = shell_command(MODULE, *argv)
-            print(f"Interrupted; continue with: {again}", file=sys.stderr)
-            return interruption.status
-    done = len(everything) - len(failed)
-    minutes = (time.monotonic() - started) / 60
-    print(f"{done} of {len(everything)} runs are finished, {minutes:.1f} min")
-    if failed:
-        print(f"failed: {', '.join(map(str, failed))}", file=sys.stderr)
-    if done:
-        print(f"Report: {shell_command('evolution.report', directory.path)}")
-    return 1 if failed else 0
+    failed = []
+    with closing(_events(jobs, options)) as events:
+        for event in _shown(everything, jobs, events):
+            if event.failure is not None:
+                failed.append(event.job)
+            elif event.ended:
+                packer.when_due()
+    packer.finish()
+    return failed
 
 
 def _measure_yardstick(directory: StudyDirectory) -> None:

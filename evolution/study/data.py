@@ -17,7 +17,7 @@ from evolution.judging.held_out import tested_on
 from evolution.judging.scores import HeldOut, KnownScores, Scores
 from evolution.run.directory import RunDirectory
 from evolution.settings.config import ExperimentConfig
-from evolution.study.config import seeds_text
+from evolution.study.config import StudyConfig, seeds_text
 from evolution.study.directory import StudyDirectory
 from evolution.study.packed_run import PackedRun, read_packed
 
@@ -135,6 +135,48 @@ def load_study(path: Path) -> StudyData:
     """
     directory = StudyDirectory(path)
     config = directory.stored_config()
+    runs, missing = _finished(directory, config)
+    everything = [run for each in runs.values() for run in each]
+    if not everything:
+        said = "; ".join([*missing[:3], "..."] if len(missing) > 3 else missing)
+        raise UserError(f"no finished run in '{path}': {said}")
+    asked, tested = directory.asked_seeds(), tuple(everything[0].scores.held_out)
+    missing += _unpaired({n: each for n, each in runs.items() if n not in asked})
+    configs = config.experiments
+    first, *others = configs
+    differing = [n for n in others if configs[n].setting != configs[first].setting]
+    if differing:
+        missing.append(
+            f"comparisons with {first} of {', '.join(differing)}, whose arena, task "
+            "or start clearance is another"
+        )
+    unequal = [n for n in others if configs[n].budget != configs[first].budget]
+    if unequal:
+        missing.append(
+            f"comparisons with {first} of {', '.join(unequal)}, whose number of trials "
+            "(evaluations times trials) is another"
+        )
+    yardstick: Mapping[str, HeldOut] = {}
+    try:
+        if not differing:
+            yardstick = _yardstick(directory, tested)
+    except UserError as error:
+        missing.append(f"{YARDSTICK}: {error}")
+    return StudyData(
+        path=path,
+        configs=configs,
+        runs=runs,
+        robots=tested,
+        steps=configs[first].steps,
+        yardstick=yardstick,
+        missing=tuple(missing),
+    )
+
+
+def _finished(
+    directory: StudyDirectory, config: StudyConfig
+) -> tuple[dict[str, tuple[RunData, ...]], list[str]]:
+    """The finished and valid runs of each experiment; what is missing, and why."""
     # before the tables: a run that is packed meanwhile is in these
     places = {name: list(directory.runs(name)) for name in config.experiments}
     packed, damaged = directory.tables.sound_runs(config)
@@ -169,40 +211,7 @@ def load_study(path: Path) -> StudyData:
             missing.append(f"{name} seeds {text}: asked for, not there")
         elif not finished:
             missing.append(f"{name}: no finished run")
-    everything = [run for each in runs.values() for run in each]
-    if not everything:
-        said = "; ".join([*missing[:3], "..."] if len(missing) > 3 else missing)
-        raise UserError(f"no finished run in '{path}': {said}")
-    missing += _unpaired({n: each for n, each in runs.items() if n not in asked})
-    yardstick: Mapping[str, HeldOut] = {}
-    configs = config.experiments
-    first, *others = configs
-    differing = [n for n in others if configs[n].setting != configs[first].setting]
-    if differing:
-        missing.append(
-            f"comparisons with {first} of {', '.join(differing)}, whose arena, task "
-            "or start clearance is another"
-        )
-    unequal = [n for n in others if configs[n].budget != configs[first].budget]
-    if unequal:
-        missing.append(
-            f"comparisons with {first} of {', '.join(unequal)}, whose number of trials "
-            "(evaluations times trials) is another"
-        )
-    try:
-        if not differing:
-            yardstick = _yardstick(directory, tested)
-    except UserError as error:
-        missing.append(f"{YARDSTICK}: {error}")
-    return StudyData(
-        path=path,
-        configs=configs,
-        runs=runs,
-        robots=tested,
-        steps=configs[first].steps,
-        yardstick=yardstick,
-        missing=tuple(missing),
-    )
+    return runs, missing
 
 
 def _unpacked(
