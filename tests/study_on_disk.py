@@ -115,7 +115,7 @@ def _write_run(
     scores = {
         "stored": float(rows[:, 2].max()),
         "validation": wheels + 1,
-        "most_believed": {"stored": float(rows[:, 2].max()), "held_out": wheels - 9},
+        "best_stored": {"fitness": float(rows[:, 2].max()), "held_out": wheels - 9},
         "held_out": {
             "epuck": held_out(wheels, rng),
             "epuck_kinematic": held_out(wheels + float(rng.uniform(0, 10)), rng),

@@ -27,15 +27,15 @@ from evolution.judging.held_out_starts import (
     starts_for_test,
     starts_for_validation,
 )
-from evolution.judging.scores import Believed, Scores
+from evolution.judging.scores import BestStored, Scores
 from evolution.run import champion as champion_choice
 from evolution.run import results
 from evolution.run.champion import (
     LATEST_BEST,
     Champion,
+    best_stored,
     candidates,
     choose_champion,
-    most_believed,
     stored_by,
 )
 from evolution.run.directory import RunDirectory
@@ -296,7 +296,7 @@ def test_the_champion_file_holds_every_score(written):
     }
     assert list(tests) == ["epuck", "epuck_kinematic"]
     # the individual with the highest stored fitness, on the robot it climbed to
-    genome, believed = most_believed(stored_by(experiment))
+    genome, best = best_stored(stored_by(experiment))
     robot = "epuck" if experiment.climbed else "epuck_kinematic"
     judge = judges_of(experiment.config)[robot]
     worth = judge.test(experiment.config.topology.decode(genome), 30)
@@ -304,9 +304,9 @@ def test_the_champion_file_holds_every_score(written):
         stored=champion.stored_fitness,
         validation=champion.validation_fitness,
         held_out=tests,
-        most_believed=Believed(stored=believed, held_out=worth.mean, robot=robot),
+        best_stored=BestStored(fitness=best, held_out=worth.mean, robot=robot),
     )
-    assert list(stored.scores) == ["stored", "validation", "held_out", "most_believed"]
+    assert list(stored.scores) == ["stored", "validation", "held_out", "best_stored"]
     assert stored.task == experiment.config.task
     assert stored.origin == Origin(
         "epuck_kinematic", "arena", 0.01, dict(experiment.scene.sha256)
@@ -365,10 +365,10 @@ def test_the_summary_names_each_robot_and_both_kinds_of_fitness(written):
     mean, crashes = (tests["epuck_kinematic"][key] for key in ("mean", "crash_rate"))
     assert cheap == f"On epuck_kinematic {mean:.1f} ({crashes:.0%} crash)"
     assert own.startswith(f"Evolution stored {stored['stored']:.1f} for it, from the")
-    believed = stored["most_believed"]
-    assert len(highest) == (believed["stored"] != stored["stored"])
+    best = stored["best_stored"]
+    assert len(highest) == (best["fitness"] != stored["stored"])
     other = scores.model_copy(
-        update={"most_believed": Believed(stored=9.0, held_out=3.0)}
+        update={"best_stored": BestStored(fitness=9.0, held_out=3.0)}
     )
     assert other.in_lines(20.0).splitlines()[-1] == (
         "The highest fitness that evolution stored was 9.0, of an individual that "

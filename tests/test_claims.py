@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from evolution.judging.scores import Believed, HeldOut, Scores
+from evolution.judging.scores import BestStored, HeldOut, Scores
 from evolution.report.samples import best_after
 from evolution.report.sections.comparisons import comparisons, comparisons_of
 from evolution.report.sections.what_was_run import evolved_on
@@ -60,7 +60,7 @@ def run(seed: int, best: float, mean: float, held_out: float, follows: float = 1
     scores = Scores(
         stored=best,
         held_out=tests,
-        most_believed=Believed(stored=best, held_out=held_out - 100),
+        best_stored=BestStored(fitness=best, held_out=held_out - 100),
     )
     return RunData(
         seed=seed,

@@ -1,4 +1,4 @@
-"""Runs that climb from the kinematic robot to wheels, with nothing believed kept."""
+"""Runs that climb from the kinematic robot to wheels, whose fitness counts alone."""
 
 from copy import deepcopy
 
@@ -8,7 +8,7 @@ import pytest
 from epuck_mj.scene.model import load_scene
 from epuck_mj.scene.model_files import ON_WHEELS
 from evolution.judging.evaluation import BatchEngine, Work
-from evolution.run.champion import candidates, choose_champion, most_believed, stored_by
+from evolution.run.champion import best_stored, candidates, choose_champion, stored_by
 from evolution.run.directory import RunDirectory
 from evolution.run.execution import Run
 from evolution.run.generation_loop import Evolution
@@ -107,8 +107,8 @@ def test_each_kinematic_robot_climbs_to_its_own_on_wheels(tmp_path, robot, wheel
     robots = [line.split(",")[-1] for line in run.evolution.history().splitlines()[1:]]
     assert robots == [robot] * 5 + [wheels] * 4
     assert list(scores.held_out) == [wheels, robot]
-    assert scores.most_believed is not None
-    assert scores.most_believed.robot == wheels
+    assert scores.best_stored is not None
+    assert scores.best_stored.robot == wheels
     assert scores.in_lines(15).startswith("The champion earns")
     assert f"fresh starts on {wheels};" in scores.in_lines(15)
     champion = choose_champion(
@@ -251,7 +251,7 @@ def test_only_what_was_stored_on_wheels_counts_as_best_after_a_climb():
     evolution = evolved(config())
     cheap = evolution.records[:5]
     evolution.records[0] = type(cheap[0])(0, 8, 1e9, 0.0, 0.0, 1, 0.0)
-    genome, stored = most_believed(stored_by(evolution))
+    genome, stored = best_stored(stored_by(evolution))
     assert stored < 1e9
     assert any((genome == other).all() for other in evolution.best_genomes[5:])
     assert candidates(stored_by(evolution))[1].max() < 1e9

@@ -142,7 +142,7 @@ def test_a_run_that_says_less_has_empty_cells(tmp_path):
         robot: {"mean": 100.0, "crash_rate": 0.1, "starts": 1000}
         for robot in fields["scores"]["held_out"]
     }
-    del fields["scores"]["most_believed"]
+    del fields["scores"]["best_stored"]
     champion.write_text(json.dumps(fields))
     (path / "running/ga/seed-1/timing.csv").write_text("generation,seconds\n")
     data = load_study(path)
@@ -733,17 +733,17 @@ def test_luck_with_noise_is_held_against_starts_with_noise(tmp_path):
     assert re.search(r"\| DE/best/1/bin \| 3 \| \d[^|]*\| \d[^|]*\| -?\d", text)
     experiment = summary_fields(data, "out", False)["experiments"]["ga"]
     assert experiment["held_out"]["epuck"]["share_of_stored"] is None
-    assert experiment["most_believed"] == {"stored": None, "held_out": None}
+    assert experiment["best_stored"] == {"fitness": None, "held_out": None}
     runs = []
     for run in data.runs["ga"]:
         test = HeldOut(mean=run.scores.stored - 7.0, crash_rate=0.0, starts=1000)
         tested = {"held_out_as_evolved": {"epuck": test}}
         runs.append(replace(run, scores=run.scores.model_copy(update=tested)))
     data = replace(data, runs={**data.runs, "ga": tuple(runs)})
-    _, _, _, held_out, found, *believed = row()
+    _, _, _, held_out, found, *best = row()
     assert held_out[0].isdigit()
     assert found == "7.0 (7.0, 7.0, 7.0)"
-    assert believed == ["-"] * 4
+    assert best == ["-"] * 4
 
 
 def test_experiments_of_other_budgets_are_not_compared(tmp_path):

@@ -34,7 +34,7 @@ def full() -> dict:
         "stored": 120.0,
         "validation": 101.0,
         "held_out": {"epuck": test, "epuck_kinematic": test},
-        "most_believed": {"stored": 130.0, "held_out": 90.0},
+        "best_stored": {"fitness": 130.0, "held_out": 90.0},
         "held_out_as_evolved": {"epuck": test},
     }
 
@@ -73,7 +73,7 @@ def test_an_old_file_knows_less():
     scores = {"stored": 120.0, "held_out": {"epuck": OLD}, "note": "of a person"}
     found = Scores.read(scores, Path("champion.json"))
     assert math.isnan(found.validation)
-    assert found.most_believed is None
+    assert found.best_stored is None
     assert found.held_out_as_evolved == {}
     test = found.held_out["epuck"]
     assert (test.mean, test.crash_rate, test.starts) == (100.0, 0.1, 1000)
@@ -144,8 +144,8 @@ STARTS = "starts: expected a whole number from 2 to 100,000"
         ("held_out.epuck.behaviour", [], "behaviour: Input should be a valid dict"),
         ("held_out.epuck.behaviour.crashed", "no", "crashed: expected a number fro"),
         ("held_out.epuck.metrics.laps", math.inf, f"metrics.laps: {NUMBER}"),
-        ("most_believed", {}, "most_believed.stored: Field required"),
-        ("most_believed.held_out", "1", f"most_believed.held_out: {NUMBER}"),
+        ("best_stored", {}, "best_stored.fitness: Field required"),
+        ("best_stored.held_out", "1", f"best_stored.held_out: {NUMBER}"),
         ("held_out_as_evolved.epuck.mean", None, f"as_evolved.epuck.mean: {NUMBER}"),
     ],
 )

@@ -53,7 +53,7 @@ DAMAGE: dict[str, Callable[[dict], object]] = {
     ),
     "starts a text": lambda f: f["scores"]["held_out"]["epuck"].update(starts="9"),
     "no starts": lambda f: f["scores"]["held_out"]["epuck"].pop("starts"),
-    "most_believed empty": lambda f: f["scores"].update(most_believed={}),
+    "best_stored empty": lambda f: f["scores"].update(best_stored={}),
     "task empty": lambda f: f.update(task={}),
     "steps a text": lambda f: f["task"].update(steps="300"),
 }

@@ -216,8 +216,8 @@ def test_what_cannot_be_packed_is_named_and_stays(unpacked, capsys):
     assert run.finished
     packed = unpacked.tables.runs(unpacked.stored_config())
     assert ("ga", 1) not in packed
-    assert packed["ga", 2].most_believed is None
-    assert packed["ga", 2].scores.most_believed is not None
+    assert packed["ga", 2].best_stored is None
+    assert packed["ga", 2].scores.best_stored is not None
 
 
 # files

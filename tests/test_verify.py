@@ -149,13 +149,13 @@ CHAMPION = {
         "mjcf_sha256: arena '0'",
     ),
     "gene": (setting("genome", 3, to=0.5), "3 0.5 is now "),
-    "believed": (
-        setting("scores", "most_believed", "held_out", to=1.0),
-        "scores.most_believed: held_out 1.0 is now ",
+    "best": (
+        setting("scores", "best_stored", "held_out", to=1.0),
+        "scores.best_stored: held_out 1.0 is now ",
     ),
-    "believed stored": (
-        setting("scores", "most_believed", "stored", to=1.0),
-        "scores.most_believed: stored 1.0 is now ",
+    "best stored": (
+        setting("scores", "best_stored", "fitness", to=1.0),
+        "scores.best_stored: fitness 1.0 is now ",
     ),
     "mean": (
         setting("scores", "held_out", "epuck", "mean", to=19.0),
@@ -180,12 +180,12 @@ CHAMPION = {
 }
 
 
-# without a checkpoint what was believed is found in another way
+# without a checkpoint the best stored is found in another way
 @pytest.mark.parametrize(
     ("kind", "what"),
     [
         *(("whole", what) for what in CHAMPION),
-        *(("shipped", what) for what in ("stored", "gene", "believed", "mean")),
+        *(("shipped", what) for what in ("stored", "gene", "best", "mean")),
     ],
 )
 def test_an_edited_champion(what, kind, request, tmp_path, capsys):
@@ -319,7 +319,7 @@ def test_the_study_knows_the_config(shipped, tmp_path, capsys):
 
 
 def test_a_champion_that_was_never_the_best(tmp_path):
-    """Without the checkpoint, it is believed what it earned in some generation."""
+    """Without the checkpoint, its fitness is what it earned in some generation."""
     run = finished_run(tmp_path, "de-best")
     arrays = files.read_arrays(run / "checkpoint.npz")
     population, fitness = (arrays[f"optimizer.{n}"] for n in ("population", "fitness"))

@@ -95,8 +95,8 @@ EDITS = {
         "champions.parquet, scores.held_out.epuck_kinematic: interval.1",
     ),
     "genome": (gene("genome"), "champions.parquet, scores"),
-    "most believed": (
-        adding("most_believed", "stored"),
+    "best stored": (
+        adding("best_stored", "fitness"),
         "champions.parquet, fitness: 0",
     ),
 }
@@ -114,16 +114,14 @@ def test_an_edited_row_is_named(what, packed, tmp_path, capsys):
     assert total == "1 of 2 runs are the same to the last bit"
 
 
-def test_the_individual_that_was_most_believed_is_tested_again(
-    packed, tmp_path, capsys
-):
+def test_the_individual_that_is_best_stored_is_tested_again(packed, tmp_path, capsys):
     def change(row: Row) -> None:
-        assert row["genome",] != row["most_believed", "genome"]
-        row["most_believed", "genome"] = row["genome",]
+        assert row["genome",] != row["best_stored", "genome"]
+        row["best_stored", "genome"] = row["genome",]
 
     study = edited(packed, tmp_path, change, 1)
     assert verify([str(study / "ga" / "seed-1")]) == 1
-    assert "scores.most_believed: held_out" in capsys.readouterr().out
+    assert "scores.best_stored: held_out" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("column", ["best", "mean", "std", "robot"])
@@ -144,9 +142,9 @@ def test_an_edited_history_is_named(column, packed, tmp_path, capsys):
 
 
 def test_what_the_tables_do_not_say_is_named(packed, tmp_path, capsys):
-    study = edited(packed, tmp_path, lambda row: row.pop(("most_believed", "genome")))
+    study = edited(packed, tmp_path, lambda row: row.pop(("best_stored", "genome")))
     assert verify([str(study)]) == 0
     assert capsys.readouterr().out.splitlines()[0] == (
         f"{study}/de-best/seed-1: the same to the last bit; champions.parquet does not "
-        "say most_believed_genome"
+        "say best_stored_genome"
     )

@@ -97,16 +97,16 @@ class HeldOut(_Record, frozen=True):
         return math.nan if value is None else value
 
 
-class Believed(_Record, frozen=True):
+class BestStored(_Record, frozen=True):
     """The individual with the highest stored fitness of a run.
 
     Attributes:
-        stored: that fitness.
+        fitness: that fitness.
         held_out: its mean on the test starts, on ideal robots.
         robot: on which it evolved and was tested; empty if unknown.
     """
 
-    stored: Score
+    fitness: Score
     held_out: Score
     robot: str = ""
 
@@ -115,17 +115,17 @@ class Scores(_Record, frozen=True):
     """Scores of a champion.
 
     Attributes:
-        stored: fitness that evolution believes in.
+        stored: fitness that evolution has for it, of its own trials.
         validation: mean on the validation starts, which chose it; nan if unknown.
         held_out: tests on the test starts by robot; one is a shipped one on wheels.
-        most_believed: the individual that the run believed most in; None if unknown.
+        best_stored: individual of the run's highest stored fitness; None if unknown.
         held_out_as_evolved: tests with the disturbances it evolved with, by robot.
     """
 
     stored: Score
     validation: Score = math.nan
     held_out: Mapping[str, HeldOut] = Field(min_length=1)
-    most_believed: Believed | None = None
+    best_stored: BestStored | None = None
     held_out_as_evolved: Mapping[str, HeldOut] = {}
 
     def in_lines(self, most: float | None) -> str:
@@ -149,10 +149,10 @@ class Scores(_Record, frozen=True):
             f"Evolution stored {self.stored:.1f} for it, from the few starts of its "
             "own trials, which may have been easy ones"
         )
-        best = self.most_believed
-        if best is not None and best.stored != self.stored:
+        best = self.best_stored
+        if best is not None and best.fitness != self.stored:
             lines.append(
-                f"The highest fitness that evolution stored was {best.stored:.1f}, of "
+                f"The highest fitness that evolution stored was {best.fitness:.1f}, of "
                 f"an individual that earns {best.held_out:.1f} on fresh starts"
             )
         return "\n".join(lines)

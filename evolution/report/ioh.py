@@ -36,7 +36,7 @@ https://iohanalyzer.liacs.nl, or with the Python package `iohinspector`.
   improvement is written at the end of its generation: late by less than a generation.
 - What happened within the first generation is not known. Readers want a row at
   evaluation 1, which says 0: the lowest fitness there is.
-- `raw_y` is the best stored fitness so far: what the algorithm believes. Held-out
+- `raw_y` is the best stored fitness so far: what the algorithm goes by. Held-out
   fitness, which the report compares by, has no history.
 - `best.x` is empty: the genomes of champions are in `champions.parquet` of the study.
 """

@@ -65,7 +65,7 @@ def with_noise(data: StudyData, name: str) -> bool:
     return data.configs[name].noise != "none"
 
 
-def believed_on(data: StudyData) -> str:
+def best_stored_robot(data: StudyData) -> str:
     """The robot on which stored fitness is compared with tests.
 
     The one on which evolution ended, where individuals of the highest stored fitness
@@ -73,10 +73,10 @@ def believed_on(data: StudyData) -> str:
     say.
     """
     found = {
-        believed.robot
+        best.robot
         for runs in data.with_runs.values()
         for run in runs
-        if (believed := run.scores.most_believed) is not None
+        if (best := run.scores.best_stored) is not None
     }
     (robot, *others) = found or {""}
     return robot if robot in data.robots and not others else data.robots[0]
@@ -84,22 +84,22 @@ def believed_on(data: StudyData) -> str:
 
 def like_for_like(data: StudyData, name: str) -> np.ndarray:
     """Held-out fitness of champions as they evolved, `(n,)`; nan if not tested so."""
-    robot = believed_on(data)
+    robot = best_stored_robot(data)
     if not with_noise(data, name):
         return data.held_out(name, robot)
     return np.array([run.held_out_as_evolved(robot) for run in data.runs[name]])
 
 
-def most_believed_fitness(data: StudyData, name: str) -> tuple[np.ndarray, np.ndarray]:
+def best_stored_fitness(data: StudyData, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Stored and held-out fitness of each run's highest stored individual, `(n,)`.
 
-    Held-out on the robot of `believed_on`; of the runs that say. None say of
+    Held-out on the robot of `best_stored_robot`; of the runs that say. None say of
     experiments with noise: theirs was tested on ideal robots only.
     """
     if with_noise(data, name):
         return np.empty(0), np.empty(0)
-    found = [run.scores.most_believed for run in data.runs[name]]
-    pairs = [(each.stored, each.held_out) for each in found if each]
+    found = [run.scores.best_stored for run in data.runs[name]]
+    pairs = [(each.fitness, each.held_out) for each in found if each]
     stored, held_out = np.array(pairs, float).reshape(-1, 2).T
     return stored, held_out
 

@@ -12,11 +12,11 @@ from evolution.pages.words import label
 from evolution.report.measures import shown_robots
 from evolution.report.run_table import run_rows
 from evolution.report.samples import (
+    best_stored_fitness,
     class_means,
     clearances,
     crash_rates,
     kept,
-    most_believed_fitness,
     tests_of,
     with_noise,
 )
@@ -77,7 +77,7 @@ def _experiment(data: StudyData, name: str) -> dict[str, Any]:
         return found
     first, last = data.rungs or (data.robots[0], data.robots[0])
     stored, begun_on = data.stored(name), data.held_out(name, first)
-    believed, worth = most_believed_fitness(data, name)
+    stored_fitness, worth = best_stored_fitness(data, name)
     rank = rank_correlation(begun_on, data.held_out(name, last))
     return found | {
         "held_out": {
@@ -95,8 +95,8 @@ def _experiment(data: StudyData, name: str) -> dict[str, Any]:
             for robot in shown_robots(data)
         },
         "stored": _described(stored),
-        "most_believed": {
-            "stored": _described(believed),
+        "best_stored": {
+            "fitness": _described(stored_fitness),
             "held_out": _described(worth),
         },
         "share_kept_between_robots": _described(

@@ -24,7 +24,7 @@ from evolution.pages.words import (
     spread,
 )
 from evolution.report.measures import shown_robots
-from evolution.report.samples import believed_on, kept, most_believed_fitness
+from evolution.report.samples import best_stored_fitness, best_stored_robot, kept
 from evolution.reproduce.claim import Claim
 from evolution.reproduce.claims import (
     claims,
@@ -200,9 +200,9 @@ def _claims(found: Sequence[Claim]) -> Table:
 
 def _hidden(study: StudyData) -> list[Block]:
     """Blocks about the individuals with the highest stored fitness."""
-    robot, rows = believed_on(study), []
+    robot, rows = best_stored_robot(study), []
     for name, runs in study.runs.items():
-        stored, held_out = most_believed_fitness(study, name)
+        stored, held_out = best_stored_fitness(study, name)
         if stored.size:
             rows.append(
                 [

@@ -90,13 +90,13 @@ def candidates(stored: Stored) -> tuple[np.ndarray, np.ndarray]:
     before = np.concatenate([[-np.inf], np.maximum.accumulate(best)[:-1]])
     raised = np.flatnonzero(best > before)[-LATEST_BEST:]
     genomes = np.concatenate([population[order], stored.best_genomes[raised]])
-    believed = np.concatenate([fitness[order], best[raised]])
+    stored_fitness = np.concatenate([fitness[order], best[raised]])
     _, first = np.unique(genomes, axis=0, return_index=True)
     first.sort()
-    return genomes[first], believed[first]
+    return genomes[first], stored_fitness[first]
 
 
-def most_believed(stored: Stored) -> tuple[np.ndarray, float]:
+def best_stored(stored: Stored) -> tuple[np.ndarray, float]:
     """The genome `(genes,)` with the highest stored fitness, and that fitness.
 
     What a run without held-out starts would show as its best.
@@ -129,14 +129,14 @@ def choose_champion(
             rounds.append((wheels, n, 1))
     else:
         rounds = [(engine, math.ceil(n * FIRST_SHARE), SCREENED), (engine, n, 1)]
-    genomes, believed = candidates(stored)
-    fitness = believed
+    genomes, stored_fitness = candidates(stored)
+    fitness = stored_fitness
     for judge, starts, kept in rounds:
         fitness = _validated(judge, evolution, genomes, starts)
         order = np.argsort(-fitness, kind="stable")[: max(kept, 1)]
-        genomes, believed = genomes[order], believed[order]
+        genomes, stored_fitness = genomes[order], stored_fitness[order]
         fitness = fitness[order]
-    return Champion(genomes[0], float(believed[0]), float(fitness[0]))
+    return Champion(genomes[0], float(stored_fitness[0]), float(fitness[0]))
 
 
 def _validated(

@@ -18,12 +18,12 @@ from epuck_mj.trials.trajectory import Trajectory
 from evolution.judging.evaluation import BatchEngine
 from evolution.judging.held_out import Judge
 from evolution.judging.held_out_starts import held_out_disturbances
-from evolution.judging.scores import Believed, Scores
+from evolution.judging.scores import BestStored, Scores
 from evolution.run.champion import (
     Champion,
     Stored,
+    best_stored,
     choose_champion,
-    most_believed,
     stored_by,
 )
 from evolution.run.directory import RunDirectory
@@ -116,16 +116,16 @@ def judged(
         if met is not None:
             tell(f"Testing it with disturbances {where}")
             as_evolved[robot] = judge.test(policy, n, met)
-    # what the run believed its best to be, and what that is worth where it evolved
+    # the highest fitness that the run stored, and what its individual is worth there
     tell("Testing the individual of the highest fitness")
-    genome, believed = best or most_believed(stored)
+    genome, stored_fitness = best or best_stored(stored)
     where = wheels if stored.climbed else Path(config.robot).name
     worth = judges[where].fitness(config.topology, genome, n)
     scores = Scores(
         stored=champion.stored_fitness,
         validation=champion.validation_fitness,
         held_out=held_out,
-        most_believed=Believed(stored=believed, held_out=worth, robot=where),
+        best_stored=BestStored(fitness=stored_fitness, held_out=worth, robot=where),
     )
     if as_evolved:
         scores = scores.model_copy(update={"held_out_as_evolved": as_evolved})

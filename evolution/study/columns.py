@@ -32,10 +32,10 @@ FIRST: tuple[Place, ...] = (
     ("control_steps",),
     ("provenance",),
     ("genome",),
-    ("most_believed", "stored"),
-    ("most_believed", "held_out"),
-    ("most_believed", "robot"),
-    ("most_believed", "genome"),
+    ("best_stored", "fitness"),
+    ("best_stored", "held_out"),
+    ("best_stored", "robot"),
+    ("best_stored", "genome"),
     ("tested_on",),
 )
 """Columns of every table, in their order; those of tests follow."""
@@ -82,8 +82,8 @@ def score_values(scores: Scores) -> Row:
     found: Row = {
         (key,): fields[key] for key in ("stored", "validation") if key in fields
     }
-    for key, value in (fields.get("most_believed") or {}).items():
-        found["most_believed", key] = value
+    for key, value in (fields.get("best_stored") or {}).items():
+        found["best_stored", key] = value
     for kind in (TESTS, AS_EVOLVED):
         for robot, test in fields.get(kind, {}).items():
             for key, value in test.items():
@@ -112,13 +112,13 @@ def score_fields(row: Row) -> dict[str, Any]:
             if test:
                 known[robot] = test
     fields[TESTS] = tests[TESTS]
-    believed = {
-        key: row["most_believed", key]
-        for key in ("stored", "held_out", "robot")
-        if ("most_believed", key) in row
+    best = {
+        key: row["best_stored", key]
+        for key in ("fitness", "held_out", "robot")
+        if ("best_stored", key) in row
     }
-    if believed:
-        fields["most_believed"] = believed
+    if best:
+        fields["best_stored"] = best
     if tests[AS_EVOLVED]:
         fields[AS_EVOLVED] = tests[AS_EVOLVED]
     return fields

@@ -12,7 +12,7 @@ from epuck_mj.host import files
 from epuck_mj.host.command_line import shell_command
 from epuck_mj.policies.file import ControllerFile, Origin
 from evolution.judging.scores import Scores, read_champion
-from evolution.run.champion import Stored, most_believed
+from evolution.run.champion import Stored, best_stored
 from evolution.run.directory import RunDirectory
 from evolution.run.history import CLIMBED, ROBOT, read_best_individuals
 from evolution.settings.comparison import differing_keys
@@ -31,7 +31,7 @@ class PackedRun:
         config: of the run, seed included.
         champion: the champion, with its task, origin and scores.
         scores: what it is worth.
-        most_believed: genome of the individual with the highest stored fitness,
+        best_stored: genome of the individual with the highest stored fitness,
             `(genes,)`; None if it is not known.
         history: of its generations; empty if only the champion was asked for.
         provenance: entry of provenance.json.
@@ -44,7 +44,7 @@ class PackedRun:
     config: ExperimentConfig
     champion: ControllerFile
     scores: Scores
-    most_believed: np.ndarray | None
+    best_stored: np.ndarray | None
     history: History
     provenance: Mapping[str, Any]
     path: Path
@@ -72,8 +72,8 @@ class PackedRun:
         }
         if known.size:
             row["control_steps",] = int(known.sum())
-        if self.most_believed is not None:
-            row["most_believed", "genome"] = self.most_believed.tolist()
+        if self.best_stored is not None:
+            row["best_stored", "genome"] = self.best_stored.tolist()
         return row
 
 
@@ -106,13 +106,13 @@ def read_packed(
     if (champion.task, champion.network) != (config.task, config.topology):
         raise UserError(f"'{directory.champion}' is of another task or network")
     history, lost_counts = history_of(directory, Path(config.robot).name)
-    believed, lost_genome = _most_believed(directory, history, config.topology.n_genes)
+    genome, lost_genome = _best_stored(directory, history, config.topology.n_genes)
     return PackedRun(
         experiment=experiment,
         config=config,
         champion=champion,
         scores=scores,
-        most_believed=believed,
+        best_stored=genome,
         history=history,
         provenance=provenance_of(directory.provenance_fields()),
         path=directory.path,
@@ -121,7 +121,7 @@ def read_packed(
     )
 
 
-def _most_believed(
+def _best_stored(
     directory: RunDirectory, history: History, n_genes: int
 ) -> tuple[np.ndarray | None, str]:
     """The genome with the highest stored fitness; of a run that climbed, since then.
@@ -136,11 +136,11 @@ def _most_believed(
     if not np.array_equal(best, history["best"]):
         return None, (
             f"'{directory.best_individuals}' has {best.size} of {history['best'].size} "
-            "generations, or other ones: most_believed_genome stays empty"
+            "generations, or other ones: best_stored_genome stays empty"
         )
     first = int(history[CLIMBED].argmax())
     nobody = np.empty((0, n_genes)), np.empty(0)
-    return most_believed(Stored(*nobody, genomes[first:], best[first:]))[0], ""
+    return best_stored(Stored(*nobody, genomes[first:], best[first:]))[0], ""
 
 
 def run_of_row(
@@ -186,13 +186,13 @@ def run_of_row(
         ),
         scores=scores.to_dict(),
     )
-    believed = row.get(("most_believed", "genome"))
+    best = row.get(("best_stored", "genome"))
     return PackedRun(
         experiment=experiment,
         config=config,
         champion=champion,
         scores=scores,
-        most_believed=None if believed is None else _genes(believed, config, path),
+        best_stored=None if best is None else _genes(best, config, path),
         history=history,
         provenance=provenance,
         path=path,

@@ -45,7 +45,7 @@ def write_table(path: Path, table: pa.Table) -> None:
 REPEATING = ("crash_rate",)
 """Columns of floats of which there are few."""
 
-LISTS = ("genome", "most_believed_genome")
+LISTS = ("genome", "best_stored_genome")
 """Columns of lists without equal values."""
 
 

@@ -74,8 +74,8 @@ def compared(written: Written, judges: Judges, threads: int) -> Outcome:
     name = CHAMPIONS if written.packed else name
     if unknown:
         # whose genome is not known: what it says cannot be made again
-        before = written.champion["scores"].get("most_believed", {})
-        now["scores"]["most_believed"] = before
+        before = written.champion["scores"].get("best_stored", {})
+        now["scores"]["best_stored"] = before
     known = said(now, written.champion)
     lines += lines_of_differences(name, written.champion, known)
     if written.trajectory is not None:
@@ -84,7 +84,7 @@ def compared(written: Written, judges: Judges, threads: int) -> Outcome:
         name, before = written.run.trajectory.name, _arrays(written.trajectory)
         lines += lines_of_differences(name, before, _arrays(shown))
     # the first generations are compared twice
-    silent = ["most_believed_genome"] if unknown else []
+    silent = ["best_stored_genome"] if unknown else []
     silent += unsaid(now, written.champion)
     return Outcome(tuple(dict.fromkeys(lines)), tuple(silent))
 
@@ -206,23 +206,26 @@ def stored_without_checkpoint(written: Written, evolution: Evolution) -> Stored:
     genomes, fitness = written.best
     if not written.packed:
         genomes, fitness = genomes[first:], fitness[first:]
-    genome, believed = written.controller.genome, written.champion["scores"]["stored"]
+    genome, stored_fitness = (
+        written.controller.genome,
+        written.champion["scores"]["stored"],
+    )
     if genome.size != genomes.shape[1]:
         nobody = np.empty((0, genomes.shape[1])), np.empty(0)
         return Stored(*nobody, genomes, fitness, bool(climbed.any()))
-    # it was the best of some generations, or it earned in one what it is believed
+    # it was the best of some generations, or it earned in one what is stored for it
     as_best = fitness[(genomes == genome).all(axis=1)]
     # a user's optimiser may store any individuals
     own = is_own(evolution.config.optimizer.algorithm)
-    if believed not in as_best and not own:
+    if stored_fitness not in as_best and not own:
         generation = written.history["generation"].astype(int)
         generations = range(generation[first], generation[-1] + 1)
         earned = _earned(evolution, genome, generations)
         least, most = earned.min(), earned.max()
-        mean = evolution.optimizer.stores_means and least <= believed <= most
-        if believed not in earned and not mean:
-            believed = as_best[-1] if as_best.size else earned.max()
-    alone = genome[None], np.array([believed])
+        mean = evolution.optimizer.stores_means and least <= stored_fitness <= most
+        if stored_fitness not in earned and not mean:
+            stored_fitness = as_best[-1] if as_best.size else earned.max()
+    alone = genome[None], np.array([stored_fitness])
     # which others the champion was chosen from, the tables do not say
     bests = alone if written.packed else (genomes, fitness)
     return Stored(*alone, *bests, bool(climbed.any()))

@@ -70,10 +70,10 @@ def read_run(run: PlacedRun) -> Written:
 
 def _of_tables(run: "PackedRun") -> Written:
     """What the tables of a study say of a run."""
-    genome, believed = run.most_believed, run.scores.most_believed
+    genome, highest = run.best_stored, run.scores.best_stored
     best = np.empty((0, run.champion.genome.size)), np.empty(0)
-    if genome is not None and believed is not None:
-        best = genome[None], np.array([believed.stored])
+    if genome is not None and highest is not None:
+        best = genome[None], np.array([highest.fitness])
     return Written(
         run=RunDirectory(run.path),
         packed=True,

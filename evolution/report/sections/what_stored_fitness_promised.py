@@ -5,9 +5,9 @@ import numpy as np
 from evolution.pages.blocks import Block, Heading, Paragraph, Table
 from evolution.pages.words import NOTHING, label, robot_name, spread
 from evolution.report.samples import (
-    believed_on,
+    best_stored_fitness,
+    best_stored_robot,
     like_for_like,
-    most_believed_fitness,
     with_noise,
 )
 from evolution.study.data import StudyData
@@ -28,13 +28,13 @@ FITNESSES = (
 
 def what_stored_fitness_promised_section(data: StudyData) -> list[Block]:
     """Blocks that compare stored fitness with fitness on fresh starts."""
-    robot = believed_on(data)
+    robot = best_stored_robot(data)
     noisy = any(with_noise(data, name) for name in data.with_runs)
     rows = []
     for name, runs in data.with_runs.items():
         stored, held_out = data.stored(name), like_for_like(data, name)
         tested = np.isfinite(held_out)
-        believed, worth = most_believed_fitness(data, name)
+        stored_fitness, worth = best_stored_fitness(data, name)
         # for each run, if every run has both
         both = held_out[tested].size == worth.size
         rows.append(
@@ -44,9 +44,9 @@ def what_stored_fitness_promised_section(data: StudyData) -> list[Block]:
                 spread(stored),
                 spread(held_out[tested]),
                 spread((stored - held_out)[tested]),
-                spread(believed),
+                spread(stored_fitness),
                 spread(worth),
-                spread(believed - worth),
+                spread(stored_fitness - worth),
                 spread(held_out[tested] - worth) if both else NOTHING,
             )
         )
