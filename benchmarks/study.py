@@ -1,12 +1,13 @@
 """What a study costs beside evaluation: `python -m benchmarks.study --json FILE`.
 
-Two figures: the share of a run's wall time that is not spent on evaluating controllers,
-at the full budget, interpreter and imports included; and how much faster two runs are
-side by side, or with a thread per core, than on one core. The second needs a machine
-with two idle cores.
+The share of a study's processor time that is not spent on evaluating controllers, with
+the study's own process, interpreters, imports and tables. And how much faster two runs
+are side by side, or with a thread per core, than on one core; this needs a machine with
+two idle cores.
 """
 
 import json
+import resource
 import subprocess
 import sys
 import tempfile
@@ -21,9 +22,11 @@ from evolution.judging.evaluation import BatchEngine
 from evolution.judging.held_out import Judge
 from evolution.run.means import Means
 from evolution.settings.config_files import find_config, load_config
+from evolution.study.config import StudyConfig, find_study
 from evolution.study.jobs import Job, carry_out, carry_out_side_by_side
 
-IMPORTS = "import evolution.study.jobs"
+STUDY, EXPERIMENTS = "paper", ("de-best", "one-plus-one-es")
+"""Experiments whose overhead is measured: the second has the shortest generations."""
 
 
 @dataclass(frozen=True)
@@ -31,12 +34,12 @@ class Options:
     """Measure what a study costs beside evaluation.
 
     Attributes:
-        evaluations: budget of the run whose overhead is measured; 0 leaves that out.
+        runs: of each experiment whose overhead is measured; 0 leaves that out.
         short: budget of the runs side by side; 0 leaves them out.
         json: also write the figures to this file; those left out stay as they were.
     """
 
-    evaluations: int = 30_000
+    runs: int = 2
     short: int = 1500
     json: Path | None = None
 
@@ -49,29 +52,53 @@ def job(folder: Path, seed: int, evaluations: int) -> Job:
     return Job("de-best", config, folder / f"seed-{seed}", ())
 
 
-def overhead(evaluations: int) -> dict[str, float]:
-    """Share of the wall time of a run on one core that is not evaluation."""
+def overhead(name: str, runs: int) -> float:
+    """Share of a study's processor time, on one core, that is not evaluation."""
+    with tempfile.TemporaryDirectory() as folder:
+        place, before = Path(folder, "study"), children_seconds()
+        command = [
+            *(sys.executable, "-m", "evolution.study", STUDY),
+            *("--experiments", name, "--seeds", f"1-{runs}"),
+            *("--jobs", "1", "--output", str(place)),
+        ]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        total = children_seconds() - before
+        config = StudyConfig.load(find_study(STUDY))
+        jobs = [
+            Job(name, config.with_seed(name, seed), Path(folder, str(seed)), ())
+            for seed in range(1, runs + 1)
+        ]
+        return 1 - sum(map(evaluation_seconds, jobs)) / total
+
+
+def children_seconds() -> float:
+    """Processor time of all processes that this one has waited for, and theirs [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def evaluation_seconds(job: Job) -> float:
+    """Processor time of the evaluations of a run, done in this process [s]."""
     spent = 0.0
 
     def timed(function: Callable) -> Callable:
         def run(*arguments, **keywords):
             nonlocal spent
-            started = time.monotonic()
+            started = time.process_time()
             try:
                 return function(*arguments, **keywords)
             finally:
-                spent += time.monotonic() - started
+                spent += time.process_time() - started
 
         return run
 
-    for kind, name in ((BatchEngine, "run"), (Judge, "test")):
-        setattr(kind, name, timed(getattr(kind, name)))
-    with tempfile.TemporaryDirectory() as folder:
-        started = time.monotonic()
-        subprocess.run([sys.executable, "-c", IMPORTS], check=True)
-        carry_out(job(Path(folder), 1, evaluations), Means(threads=1), lambda _: None)
-        total = time.monotonic() - started
-    return {"evaluations": evaluations, "overhead": 1 - spent / total}
+    kept = BatchEngine.run, Judge.test
+    BatchEngine.run, Judge.test = map(timed, kept)
+    try:
+        carry_out(job, Means(threads=1), lambda _: None)
+    finally:
+        BatchEngine.run, Judge.test = kept
+    return spent
 
 
 def side_by_side(evaluations: int) -> dict[str, float]:
@@ -106,9 +133,10 @@ def study(argv: Sequence[str]) -> int:
             f"other on two threads: {found['two_threads_each']:.2f}x",
             flush=True,
         )
-    if options.evaluations:
-        found |= overhead(options.evaluations)
-        print(f"overhead: {found['overhead']:.1%} of the wall time")
+    if options.runs:
+        for name in EXPERIMENTS:
+            found[f"overhead of {name}"] = share = overhead(name, options.runs)
+            print(f"{name}: {share:.1%} of the processor time is not evaluation")
     write_figures(options.json, found)
     return 0
 
