@@ -96,11 +96,15 @@ def test_the_code_runs(folder, capsys):
     for block in BLOCKS:
         exec(compile(block, "recipes.md", "exec"), {})
     assert {path.name for path in folder.iterdir()} == WRITTEN | {"results"}
-    corridor, classes, real = capsys.readouterr().out.splitlines()
+    corridor, classes, real, *crashes = capsys.readouterr().out.splitlines()
     fitness = r"fitness \d+\.\d of 300"
     assert re.fullmatch(rf"{fitness}, \d+% of trials crash", corridor)
     assert re.fullmatch(fitness, real)
     assert sum(eval(classes).values()) == pytest.approx(1)
+    # numbers of worlds, and crash rates: weak sensors and late commands are the worst
+    worlds = [line.split()[-2:] for line in crashes[2:]]
+    assert sum(int(n) for n, _ in worlds) == 100
+    assert max(range(len(worlds)), key=lambda i: float(worlds[i][1])) == 1
 
     path = pd.read_csv("path.csv")
     trajectory = Trajectory.load("path.npz")

@@ -104,7 +104,11 @@ def _open(study: StudyData, pair: Comparison) -> str | None:
     if pair.enough and (pair.decided or pair.equivalent):
         return None
     a, b = label(study, pair.a), label(study, pair.b)
-    text = f"Whether {a} or {b} earns more, or both the same: {_shift(pair)}."
+    differ, same = probability(pair.p_holm), probability(pair.p_equivalence)
+    text = (
+        f"Whether {a} or {b} earns more, or both the same: {_shift(pair)}. Holm p "
+        f"{differ} of a difference, {same} of equivalence."
+    )
     needed = runs_needed(pair)
     if needed is not None and needed <= MANY:
         text += (
@@ -137,4 +141,4 @@ def runs_needed(pair: Comparison) -> int | None:
 def _shift(pair: Comparison) -> str:
     found = pair.equivalence
     bounds = between(Interval(found.shift, found.low, found.high), ".1f")
-    return f"estimated difference {found.shift:z.1f}, 90 % interval {bounds}"
+    return f"Hodges-Lehmann difference {found.shift:z.1f}, 90 % interval {bounds}"
