@@ -1,11 +1,11 @@
 """The reality gap: worlds that cover what may differ, and honest arithmetic on them."""
 
-import csv
 import json
 import re
 from dataclasses import fields, replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.image import imread
 from matplotlib.legend import Legend
@@ -408,7 +408,7 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
     assert measure_gap([*arguments, *small]) == 0
     names = {path.name for path in output.iterdir()}
     pictures = {"gap.png", "gap.svg", "gap.pdf"}
-    assert names == {"gap.md", "summary.md", "gap.json", "gap.csv", *pictures}
+    assert names == {"gap.md", "summary.md", "gap.json", "gap.parquet", *pictures}
     assert (output / "gap.md").read_text() in capsys.readouterr().out
     record = json.loads((output / "gap.json").read_text())
     assert {
@@ -417,18 +417,17 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
     kinds = record["robots"]["epuck_kinematic"]
     slow = "wall-follower at 0.04 m/s"
     assert list(kinds["usual"])[:3] == ["wall-follower", slow, str(CHAMPION)]
-    with (output / "gap.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    rows = pd.read_parquet(output / "gap.parquet").to_dict("records")
     assert len(rows) == 4 * 3 * len(KINDS)
     for row in rows:
-        kind, world = row["kind"], int(row["number"])
+        kind, world = row["kind"], row["number"]
         policy = kinds[kind][row["policy"]]
         there = policy["in_worlds"]["fitness"][world]
         share = there / max(policy["nominal"], policy["ideal"][world])
-        assert float(row["share"]) == pytest.approx(share, abs=1e-4)
-        assert float(row["fitness"]) == pytest.approx(there, abs=1e-4)
+        assert row["share"] == pytest.approx(share, abs=1e-4)
+        assert row["fitness"] == pytest.approx(there, abs=1e-4)
         crashes = policy["in_worlds"]["crash_rate"][world]
-        assert float(row["crash_rate"]) == pytest.approx(crashes, abs=1e-4)
+        assert row["crash_rate"] == pytest.approx(crashes, abs=1e-4)
         assert row["arena"] == record["worlds"][kind][world]["arena"]
     assert imread(output / "gap.png").shape[1] > 1000
     first = (output / "gap.json").read_bytes()

@@ -29,7 +29,7 @@ class GapOptions:
 
     Attributes:
         paths: run or study directories, controller files, or wall-follower.
-        output: folder for gap.md, summary.md, gap.json, gap.csv and figures.
+        output: folder for gap.md, summary.md, gap.json, gap.parquet and figures.
         worlds: number of worlds of each kind.
         starts: number of test starts in each world and in the arena of evolution.
         robot: robot that drives; if not given, the one that all evolved on, kinematic

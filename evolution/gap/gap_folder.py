@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
 from tqdm import tqdm
 
-from epuck_mj.host.csv_text import csv_text
 from epuck_mj.host.files import write_text, writing
 from evolution.gap.figure import gap_figure
 from evolution.gap.gap_document import gap_document, gap_summary
@@ -21,6 +22,7 @@ from evolution.gap.worlds import KINDS, World, worlds
 from evolution.named_policies import NamedPolicy
 from evolution.pages.blocks import to_markdown
 from evolution.pages.figure_files import write_figure
+from evolution.study.table_files import write_table
 
 Places = Mapping[str, Sequence[World]]
 """Worlds by their kind."""
@@ -143,26 +145,37 @@ def _write(
     }
     with writing():
         write_text(folder / "gap.json", json.dumps(record) + "\n")
-        write_text(folder / "gap.csv", _rows(places, gaps))
+        write_table(folder / "gap.parquet", outcomes_table(_rows(places, gaps)))
         write_text(folder / "gap.md", to_markdown(gap_document(gaps)))
         write_text(folder / "summary.md", to_markdown([gap_summary(gaps)]))
     names = labels(policies, gaps[0].groups)
     write_figure(gap_figure(gaps, names), folder, "gap")
 
 
-def _rows(places: Places, gaps: Sequence[Gap]) -> str:
-    """Rows of gap.csv, one per kind of worlds, robot, policy and world.
+def outcomes_table(rows: Sequence[Mapping[str, Any]]) -> pa.Table:
+    """The table of gap.parquet, of one row per kind of worlds, robot, policy and world.
 
-    What a world is like is in gap.json.
+    What a world is like is in gap.json. Numbers have four decimals.
     """
-    rows = [
+    rounded = [
+        {
+            name: round(value, 4) if isinstance(value, float) else value
+            for name, value in row.items()
+        }
+        for row in rows
+    ]
+    return pa.Table.from_pylist(rounded)
+
+
+def _rows(places: Places, gaps: Sequence[Gap]) -> list[dict[str, Any]]:
+    return [
         {
             "robot": robot,
             "policy": name,
-            "fitness": f"{transfer.fitness[j, i]:.4f}",
-            "crash_rate": f"{transfer.crash_rate[j, i]:.4f}",
-            "share": f"{transfer.share[j, i]:.4f}",
-            "collisions_per_minute": f"{transfer.collisions[j, i]:.4f}",
+            "fitness": float(transfer.fitness[j, i]),
+            "crash_rate": float(transfer.crash_rate[j, i]),
+            "share": float(transfer.share[j, i]),
+            "collisions_per_minute": float(transfer.collisions[j, i]),
             "kind": world.kind,
             "number": world.number,
             "arena": world.arena,
@@ -172,4 +185,3 @@ def _rows(places: Places, gaps: Sequence[Gap]) -> str:
         for i, name in enumerate(gap.names)
         for j, world in enumerate(places[gap.kind])
     ]
-    return csv_text(list(rows[0]), rows)

@@ -65,9 +65,9 @@ def settled_blocks(
         Paragraph(
             "Our runs cannot settle what the paper does not say: the length of a "
             "trial, the size of the tournament, what happens to weights that leave "
-            "their bounds. The study `variations` changes the last two, one at a time; "
-            "`steps-150` and `steps-500` change the length of a trial. Runs of the "
-            "original program, or its source, would settle them."
+            "their bounds. The study of variations changes the last two, one at a "
+            "time; two more studies change the length of a trial. Runs of the original "
+            "program, or its source, would settle them."
         )
     )
     return blocks
