@@ -350,9 +350,7 @@ def test_what_is_out_of_bounds_is_said():
 def test_starts_and_reset_options():
     env, many = make().unwrapped, make_vec(2)
     for bad in ([0.0, 0.0], [np.nan, 0, 0], "here", None):
-        with pytest.raises(
-            UserError, match=r"starts: expected finite numbers of shape"
-        ):
+        with pytest.raises(UserError, match=r"start: expected finite numbers of shape"):
             env.reset(options={"start": bad})
     with pytest.raises(UserError, match=r"of shape \(2, 3\)"):
         many.reset(options={"starts": [0.0, 0.0, 0.0]})

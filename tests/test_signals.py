@@ -177,22 +177,25 @@ def interrupted(
     return process.returncode != 0
 
 
-def time_to_begin(folder: Path) -> float:
+def time_to_begin(output: Path) -> float:
     """Time until a run has begun [s]: the slower the machine, the later are signals."""
-    started, output = time.monotonic(), folder / "first"
-    with python_process("-m", *command("wheels", output), cwd=folder):
+    started = time.monotonic()
+    with python_process("-m", *command("wheels", output), cwd=output.parent):
         while not RunDirectory(output).begun:
             assert time.monotonic() < started + PATIENCE
             time.sleep(0.01)
-    return time.monotonic() - started
+        return time.monotonic() - started
 
 
 def test_runs_and_studies_are_gone_on_with(references, tmp_path, monkeypatch):
     rng, n, case = random.Random(f"signals {SEED}"), 0, 0
     monkeypatch.chdir(tmp_path)
     write_experiments(tmp_path)
-    loading = time_to_begin(tmp_path)
+    # the first may compile something, and the machine may have been busy
+    loading = min(time_to_begin(tmp_path / name) for name in ("first", "second"))
     while n < N:
+        # most signals come before the end
+        assert case < 10 * N
         name = COMMANDS[case % len(COMMANDS)]
         case += 1
         output = tmp_path / f"{case}-{name}"

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from tqdm import tqdm
 
 from epuck_mj.host.files import write_text, writing
@@ -22,7 +21,7 @@ from evolution.gap.worlds import KINDS, World, worlds
 from evolution.named_policies import NamedPolicy
 from evolution.pages.blocks import to_markdown
 from evolution.pages.figure_files import write_figure
-from evolution.study.table_files import write_table
+from evolution.study.table_files import write_rows
 
 Places = Mapping[str, Sequence[World]]
 """Worlds by their kind."""
@@ -145,37 +144,26 @@ def _write(
     }
     with writing():
         write_text(folder / "gap.json", json.dumps(record) + "\n")
-        write_table(folder / "gap.parquet", outcomes_table(_rows(places, gaps)))
+        write_rows(folder / "gap.parquet", _rows(places, gaps))
         write_text(folder / "gap.md", to_markdown(gap_document(gaps)))
         write_text(folder / "summary.md", to_markdown([gap_summary(gaps)]))
     names = labels(policies, gaps[0].groups)
     write_figure(gap_figure(gaps, names), folder, "gap")
 
 
-def outcomes_table(rows: Sequence[Mapping[str, Any]]) -> pa.Table:
-    """The table of gap.parquet, of one row per kind of worlds, robot, policy and world.
-
-    What a world is like is in gap.json. Numbers have four decimals.
-    """
-    rounded = [
-        {
-            name: round(value, 4) if isinstance(value, float) else value
-            for name, value in row.items()
-        }
-        for row in rows
-    ]
-    return pa.Table.from_pylist(rounded)
-
-
 def _rows(places: Places, gaps: Sequence[Gap]) -> list[dict[str, Any]]:
+    """Rows of gap.parquet, one per kind of worlds, robot, policy and world.
+
+    What a world is like is in gap.json. Four decimals are enough for plots, and small.
+    """
     return [
         {
             "robot": robot,
             "policy": name,
-            "fitness": float(transfer.fitness[j, i]),
-            "crash_rate": float(transfer.crash_rate[j, i]),
-            "share": float(transfer.share[j, i]),
-            "collisions_per_minute": float(transfer.collisions[j, i]),
+            "fitness": round(float(transfer.fitness[j, i]), 4),
+            "crash_rate": round(float(transfer.crash_rate[j, i]), 4),
+            "share": round(float(transfer.share[j, i]), 4),
+            "collisions_per_minute": round(float(transfer.collisions[j, i]), 4),
             "kind": world.kind,
             "number": world.number,
             "arena": world.arena,

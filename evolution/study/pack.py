@@ -12,7 +12,10 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.command_line import main, parse, word
 from evolution.study.directory import StudyDirectory
 
-EXAMPLES = ("python -m evolution.study.pack runs/paper",)
+EXAMPLES = (
+    "python -m evolution.study.pack runs/paper",
+    "python -m evolution.study.pack runs/paper runs/wheels",
+)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Parquet files: written in full or not at all, the same bytes for the same table."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,11 @@ def write_table(path: Path, table: pa.Table) -> None:
     # equal tables can be in unequal pieces, which would end up in the file
     pq.write_table(table.combine_chunks(), sink, **settings)
     files.write_bytes(path, sink.getvalue().to_pybytes())
+
+
+def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Replace a file by a table of rows, each with its values by column."""
+    write_table(path, pa.Table.from_pylist([*rows]))
 
 
 REPEATING = ("crash_rate",)
