@@ -29,6 +29,9 @@ LONG += ("run", "systems", "kinematic", "replay_processes", "verify", "climb", "
 
 # ignored where tests run in the background of a script, and by all that they start
 signal.signal(signal.SIGINT, signal.default_int_handler)
+if hasattr(signal, "SIGHUP"):
+    # by `nohup`
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def pytest_configure(config: pytest.Config) -> None:
