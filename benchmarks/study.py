@@ -39,7 +39,7 @@ class Options:
         json: also write the figures to this file; those left out stay as they were.
     """
 
-    runs: int = 3
+    runs: int = 2
     short: int = 1500
     json: Path | None = None
 
