@@ -7,9 +7,15 @@ from typing import Any, Protocol, Self, runtime_checkable
 import numpy as np
 
 from epuck_mj.constants import PROXIMITY_RANGE
-from epuck_mj.host.limits import check, shown
+from epuck_mj.host.limits import check
 from epuck_mj.host.own_parts import is_own
-from epuck_mj.step.fitness import FORMULAS, StepFacts, StepFitness, step_fitness
+from epuck_mj.step.fitness import (
+    FORMULAS,
+    StepFacts,
+    StepFitness,
+    step_fitness,
+    unknown_fitness,
+)
 from epuck_mj.step.motors import Speeds, command
 from epuck_mj.step.sensors import Reading, observe
 
@@ -93,10 +99,7 @@ class TaskParameters:
             check(name, getattr(self, name))
         fitness: Any = self.fitness
         if not (isinstance(fitness, str) and (fitness in FORMULAS or is_own(fitness))):
-            raise ValueError(
-                f"unknown fitness {shown(fitness)}; available: {', '.join(FORMULAS)}, "
-                "or my.py:name for a function of your own"
-            )
+            raise ValueError(unknown_fitness(fitness))
 
     @classmethod
     def of(cls, keys: Any) -> Self:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from epuck_mj.errors import UserError
+from epuck_mj.host.limits import shown
 from epuck_mj.host.own_parts import failure, is_own, own_part
 
 
@@ -177,9 +178,14 @@ def step_fitness(name: str) -> StepFitness:
     """
     if name in FORMULAS or is_own(name):
         return _step_fitness(name)
+    raise UserError(unknown_fitness(name))
+
+
+def unknown_fitness(name: object) -> str:
+    """What is said of a fitness that there is not."""
     available = ", ".join(sorted(FORMULAS))
-    raise UserError(
-        f"unknown fitness '{name}'; available: {available}, or my.py:name for a "
+    return (
+        f"unknown fitness {shown(name)}; available: {available}, or my.py:name for a "
         "function of your own"
     )
 

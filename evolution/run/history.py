@@ -78,9 +78,9 @@ def read_history(path: Path) -> dict[str, np.ndarray]:
         if tuple(texts) not in known or not texts[HISTORY[0]]:
             raise ValueError(f"expected rows of {','.join(HISTORY)}")
         columns = {name: np.array(texts[name], float) for name in HISTORY}
-        robots = texts.get(ROBOT, [])
-        others = [robot != robots[0] for robot in robots]
-        columns[CLIMBED] = np.array(others or np.zeros(len(texts[HISTORY[0]])), float)
+        # older histories do not say which robot it was
+        robots = texts.get(ROBOT, [""] * len(texts[HISTORY[0]]))
+        columns[CLIMBED] = np.array([each != robots[0] for each in robots], float)
         spent = np.diff(columns["evaluations"], prepend=0)
         finite = all(np.isfinite(each).all() for each in columns.values())
         if (spent <= 0).any() or not finite:
@@ -132,12 +132,16 @@ def timing_text(
                 taken[int(number)] = f"{float(text):.3f}"
     first = len(records) - len(seconds)
     taken |= {first + i: f"{each:.3f}" for i, each in enumerate(seconds)}
-    lines = [
-        f"{record.generation},{taken.get(record.generation, '')},"
-        f"{record.control_steps},{record.crash_rate:.4f}\n"
+    rows = (
+        {
+            "generation": record.generation,
+            "seconds": taken.get(record.generation),
+            "control_steps": record.control_steps,
+            "crash_rate": f"{record.crash_rate:.4f}",
+        }
         for record in records
-    ]
-    return "".join(["generation,seconds,control_steps,crash_rate\n", *lines])
+    )
+    return csv_text(["generation", "seconds", "control_steps", "crash_rate"], rows)
 
 
 def table_text(path: Path) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
-from epuck_mj.host.csv_text import csv_columns
+from epuck_mj.host.csv_text import csv_columns, csv_text
 from epuck_mj.policies.file import CHAMPIONS
 from evolution.run.history import table_text
 from evolution.study.columns import Row, rows_of, table_of
@@ -199,8 +199,11 @@ TIMING = ("experiment", "seed", "seconds")
 
 
 def _write_seconds(path: Path, seconds: Mapping[RunKey, float]) -> None:
-    lines = [f"{name},{seed},{time:.3f}\n" for (name, seed), time in seconds.items()]
-    files.write_text(path, "".join([",".join(TIMING), "\n", *lines]))
+    rows = (
+        {"experiment": name, "seed": seed, "seconds": f"{time:.3f}"}
+        for (name, seed), time in seconds.items()
+    )
+    files.write_text(path, csv_text(TIMING, rows))
 
 
 def _run(row: Row) -> RunKey:
