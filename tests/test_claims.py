@@ -37,7 +37,8 @@ from evolution.reproduce.verdicts import (
 )
 from evolution.settings.config_files import find_config, load_config
 from evolution.statistics.best_of_few import chance_of_best, chance_of_order
-from evolution.study.data import RunData, StudyData
+from evolution.study.data import StudyData
+from tests.finished_runs import finished_run
 
 NAMES = ("de-best", "de-rand", "ga")
 
@@ -62,9 +63,9 @@ def run(seed: int, best: float, mean: float, held_out: float, follows: float = 1
         held_out=tests,
         best_stored=BestStored(fitness=best, held_out=held_out - 100),
     )
-    return RunData(
-        seed=seed,
-        history={
+    return finished_run(
+        seed,
+        {
             "generation": np.arange(10.0),
             "evaluations": evaluations,
             "best": best * evaluations / 1000,
@@ -72,9 +73,7 @@ def run(seed: int, best: float, mean: float, held_out: float, follows: float = 1
             "std": np.ones(10),
             "climbed": np.zeros(10),
         },
-        champion=None,  # type: ignore[arg-type]
-        scores=scores,
-        path=Path(f"seed-{seed}"),
+        scores,
     )
 
 

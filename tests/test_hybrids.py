@@ -24,12 +24,14 @@ from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import find_config, load_config
 from evolution.statistics.significance import holm, mann_whitney
 from evolution.study.config import StudyConfig, find_study
-from evolution.study.data import RunData, StudyData
+from evolution.study.data import StudyData
+from evolution.study.finished_run import FinishedRun
+from tests.finished_runs import finished_run
 
 N = 12
 
 
-def run(seed: int, held_out: float, trials: int) -> RunData:
+def run(seed: int, held_out: float, trials: int) -> FinishedRun:
     tests = {
         robot: HeldOut(mean=held_out, crash_rate=seed / 100, starts=200)
         for robot in ("epuck", "epuck_kinematic")
@@ -37,12 +39,10 @@ def run(seed: int, held_out: float, trials: int) -> RunData:
     # useful after as many trials for everybody, but for the first run
     best = [50.0, 150.0 if seed == 0 else 210.0]
     spent = np.array([1000.0, 60_000 / trials])
-    return RunData(
-        seed=seed,
-        history={"evaluations": spent, "best": np.array(best)},
-        champion=None,  # type: ignore[arg-type]
-        scores=Scores(stored=held_out, held_out=tests),
-        path=Path(f"seed-{seed}"),
+    return finished_run(
+        seed,
+        {"evaluations": spent, "best": np.array(best)},
+        Scores(stored=held_out, held_out=tests),
     )
 
 

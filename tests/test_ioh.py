@@ -13,7 +13,8 @@ from evolution.report.ioh import (
     export_histories,
     improvements,
 )
-from evolution.study.data import RunData, load_study
+from evolution.study.data import load_study
+from tests.finished_runs import finished_run
 from tests.study_on_disk import LEVELS, history, write_study
 
 SEEDS = {"de-best": [1, 2, 7], "ga": [3], "de-rand": []}
@@ -108,8 +109,7 @@ def a_run(evaluations, best):
         "evaluations": np.array(evaluations, float),
         "best": np.array(best, float),
     }
-    champion = scores = None
-    return RunData(1, columns, champion, scores, Path())  # type: ignore[arg-type]
+    return finished_run(1, columns)
 
 
 @pytest.mark.parametrize(

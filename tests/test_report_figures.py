@@ -42,7 +42,8 @@ from evolution.report.figures.curves import (
 from evolution.report.figures.trajectories import median_run, trajectories_figure
 from evolution.report.samples import TARGET_SHARES
 from evolution.settings.config_files import load_config, shipped_experiments
-from evolution.study.data import RunData, StudyData
+from evolution.study.data import StudyData
+from tests.finished_runs import finished_run
 
 ROBOTS = ("epuck", "epuck_kinematic")
 STEPS = 300
@@ -77,7 +78,7 @@ def a_run(name, seed, robots=ROBOTS, evaluations=30_000):
     champion = ControllerFile(
         Network(), genome, TaskParameters(STEPS), Origin("epuck", "arena"), {}
     )
-    return RunData(seed, history, champion, scores, Path("nowhere"))
+    return finished_run(seed, history, scores, champion)
 
 
 def a_study(n_runs=N_RUNS, robots=ROBOTS, yardstick=True):

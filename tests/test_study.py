@@ -32,9 +32,9 @@ from evolution.study import jobs
 from evolution.study.__main__ import study
 from evolution.study.config import StudyConfig
 from evolution.study.directory import StudyDirectory
+from evolution.study.finished_run import FinishedRun
 from evolution.study.histories import history_of
 from evolution.study.jobs import Event, Job, carry_out, failure_log, failure_of
-from evolution.study.packed_run import PackedRun
 from evolution.study.packing import Packer, pack
 from tests.no_pictures import INSTEAD, draw_nothing
 from tests.processes import PATIENCE, python_process
@@ -123,13 +123,13 @@ def running(study: Path, name: str, seed: int) -> Path:
     return study / "running" / name / f"seed-{seed}"
 
 
-def packed(study: Path, name: str, seed: int) -> PackedRun:
+def packed(study: Path, name: str, seed: int) -> FinishedRun:
     """A run in the tables."""
     directory = StudyDirectory(study)
     return directory.tables.runs(directory.stored_config())[name, seed]
 
 
-def assert_reproduced(run: PackedRun, reference: Path) -> None:
+def assert_reproduced(run: FinishedRun, reference: Path) -> None:
     """A run in the tables says what the directory of a run does."""
     assert run.champion.to_json() == (reference / "champion.json").read_text()
     history, _ = history_of(RunDirectory(reference), "epuck_kinematic")

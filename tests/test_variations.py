@@ -10,24 +10,24 @@ from epuck_mj.errors import UserError
 from evolution.judging.scores import HeldOut, Scores
 from evolution.settings.config_files import find_config, load_config
 from evolution.statistics.significance import holm, mann_whitney
-from evolution.study.data import RunData, StudyData
+from evolution.study.data import StudyData
+from evolution.study.finished_run import FinishedRun
 from evolution.study.pack import pack_studies
 from evolution.variations import __main__ as module
 from evolution.variations.__main__ import report_variations
 from evolution.variations.change_words import in_words
 from evolution.variations.varied import UNCHANGED, orders, varied_of
+from tests.finished_runs import finished_run
 
 N = 12
 
 
-def run(seed: int, held_out: float, stored: float) -> RunData:
+def run(seed: int, held_out: float, stored: float) -> FinishedRun:
     test = HeldOut(mean=held_out, crash_rate=0.1, starts=200)
-    return RunData(
-        seed=seed,
-        history={"evaluations": np.array([1.0]), "best": np.array([stored])},
-        champion=None,  # type: ignore[arg-type]
-        scores=Scores(stored=stored, held_out={"epuck": test}),
-        path=Path(f"seed-{seed}"),
+    return finished_run(
+        seed,
+        {"evaluations": np.array([1.0]), "best": np.array([stored])},
+        Scores(stored=stored, held_out={"epuck": test}),
     )
 
 

@@ -21,7 +21,7 @@ from evolution.run.directory import RunDirectory
 from evolution.run.generation_loop import Evolution
 from evolution.settings.config_files import find_config, load_config
 from evolution.study.addresses import runs_at
-from evolution.study.packed_run import PackedRun
+from evolution.study.finished_run import FinishedRun
 
 CHAMPION, EARLIER, RANDOM, BY_HAND = "champion", "earlier", "random", "by hand"
 
@@ -92,7 +92,7 @@ def tried(results: Path, evolved: dict[str, list[float]]) -> list[Tried]:
     return found
 
 
-def _runs(results: Path) -> Iterator[PackedRun]:
+def _runs(results: Path) -> Iterator[FinishedRun]:
     """The first runs of each experiment, by study, experiment and seed."""
     for study in STUDIES:
         for run in runs_at(results / study, histories=True):
@@ -101,7 +101,7 @@ def _runs(results: Path) -> Iterator[PackedRun]:
 
 
 def _of_run(
-    run: PackedRun, name: str, evolved: dict[str, list[float]]
+    run: FinishedRun, name: str, evolved: dict[str, list[float]]
 ) -> Iterator[Tried]:
     """The champion of a run and, of the first runs, the best of earlier generations.
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from epuck_mj.host.files import write_text
 from evolution.pages.words import label
-from evolution.study.data import RunData, StudyData
+from evolution.study.data import StudyData
+from evolution.study.finished_run import FinishedRun
 
 FUNCTION_ID, FUNCTION = 1, "WallFollowing"
 
@@ -84,7 +85,7 @@ def export_histories(data: StudyData, folder: Path) -> None:
         write_text(file, json.dumps(meta, indent=1) + "\n")
 
 
-def improvements(run: RunData) -> list[tuple[int, float]]:
+def improvements(run: FinishedRun) -> list[tuple[int, float]]:
     """Evaluations and best stored fitness so far where it rises, and at the end."""
     spent = run.history["evaluations"]
     best = np.maximum.accumulate(run.history["best"])
@@ -96,7 +97,7 @@ def improvements(run: RunData) -> list[tuple[int, float]]:
     return curve if curve[0][0] == 1 else [(1, LOWEST), *curve]
 
 
-def _run(run: RunData, curve: Sequence[tuple[int, float]]) -> dict:
+def _run(run: FinishedRun, curve: Sequence[tuple[int, float]]) -> dict:
     """Meta data of a run."""
     best = max(y for _, y in curve)
     first = next(n for n, y in curve if y == best)

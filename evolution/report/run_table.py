@@ -8,7 +8,8 @@ from evolution.judging.scores import HeldOut
 from evolution.pages.words import robot_name
 from evolution.report.measures import shown_robots
 from evolution.study.columns import prefixes
-from evolution.study.data import RunData, StudyData
+from evolution.study.data import StudyData
+from evolution.study.finished_run import FinishedRun
 
 T = TypeVar("T")
 
@@ -58,7 +59,7 @@ TEST_COLUMNS: Mapping[str, Column[HeldOut]] = {
 }
 """Columns of a held-out evaluation."""
 
-RUN_COLUMNS: Mapping[str, Column[RunData]] = {
+RUN_COLUMNS: Mapping[str, Column[FinishedRun]] = {
     "stored": (
         lambda run: run.scores.stored,
         FITNESS,
@@ -117,7 +118,7 @@ def described_columns(data: StudyData) -> list[dict[str, str]]:
     ]
 
 
-def _run_row(data: StudyData, name: str, run: RunData) -> dict[str, Any]:
+def _run_row(data: StudyData, name: str, run: FinishedRun) -> dict[str, Any]:
     row: dict[str, Any] = {"experiment": name, "seed": run.seed}
     for robot, prefix in prefixes(shown_robots(data)).items():
         test = run.scores.held_out[robot]

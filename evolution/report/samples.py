@@ -7,7 +7,8 @@ import numpy as np
 
 from evolution.judging.scores import HeldOut
 from evolution.statistics.targets import evaluations_to_target
-from evolution.study.data import RunData, StudyData
+from evolution.study.data import StudyData
+from evolution.study.finished_run import FinishedRun
 
 FOLLOWED = 0.9
 """Least share of a champion's trials that follow a wall without crashing."""
@@ -104,7 +105,7 @@ def best_stored_fitness(data: StudyData, name: str) -> tuple[np.ndarray, np.ndar
     return stored, held_out
 
 
-def hits(runs: Sequence[RunData], steps: int) -> np.ndarray:
+def hits(runs: Sequence[FinishedRun], steps: int) -> np.ndarray:
     """Evaluations until each run reached each target, `(runs, targets)`; nan: never."""
     return np.array(
         [
@@ -123,7 +124,7 @@ BUDGETS = (3_000, 6_000, 9_000, 15_000)
 """Evaluations after which best stored fitness is compared."""
 
 
-def best_after(runs: Sequence[RunData], budget: int) -> np.ndarray:
+def best_after(runs: Sequence[FinishedRun], budget: int) -> np.ndarray:
     """Best stored fitness after a number of evaluations, `(runs,)`; 0 if none yet."""
     return np.array(
         [

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.pages.blocks import Table
 from evolution.pages.words import label, percent
-from evolution.study.data import RunData, StudyData
+from evolution.study.data import StudyData
+from evolution.study.finished_run import FinishedRun
 
 COLUMNS = (
     "champion",
@@ -34,7 +35,7 @@ def champions_table(studies: Sequence[StudyData]) -> Table:
     return Table(COLUMNS, rows, texts=2)
 
 
-def _scores(run: RunData) -> list[str]:
+def _scores(run: FinishedRun) -> list[str]:
     """Cells of a champion: fitness, crashes and distance on wheels."""
     test = run.scores.held_out[WHEELED_ROBOT]
     disturbed = run.scores.held_out_as_evolved.get(WHEELED_ROBOT)

@@ -15,7 +15,13 @@ from epuck_mj.scene.model import Scene, load_scene
 from epuck_mj.scene.model_files import is_kinematic, on_wheels
 from epuck_mj.scene.starts import FreeSpace
 from epuck_mj.step.disturbances import Disturbances
-from evolution.judging.evaluation import BatchEngine, DmControlEngine, Engine, evaluate
+from evolution.judging.evaluation import (
+    BatchEngine,
+    DmControlEngine,
+    Engine,
+    Evaluation,
+    evaluate,
+)
 from evolution.judging.lessons import (
     Circumstances,
     GivenLessons,
@@ -172,42 +178,25 @@ class Evolution:
         self._lesson_robots = None
 
     def _generation(self) -> Record:
-        config = self.config
-        generation = self.optimizer.generation
-        met = self.disturbances(generation)
-        climbs = self._climbs_now
+        generation, climbs = self.optimizer.generation, self._climbs_now
         spent, evaluations = self.evaluations, []
         if climbs:
             self.climb()
             known = self.optimizer.population
-            starts = self.starts(generation, len(known))
-            anew = evaluate(self.engine, config.topology, known, starts, None, met)
-            self.optimizer.judge_anew(anew.fitness)
+            evaluations.append(self._evaluated(known))
+            self.optimizer.judge_anew(evaluations[-1].fitness)
             spent += len(known)
-            evaluations.append(anew)
-        cost = self.optimizer.next_cost()
-        genomes, lessons = self.optimizer.ask(), None
-        if cost > len(genomes):
-            lessons = self._lessons(generation)
-            self.optimizer.learn_in_life(lessons)
-            genomes = self.optimizer.pending()
-            if lessons.cost != cost - len(genomes):
-                raise AskTellError(
-                    f"expected lessons of {cost - len(genomes)} evaluations, "
-                    f"got {lessons.cost}"
-                )
+        spent += self.optimizer.next_cost()
+        genomes, lessons = self._asked()
         to_beat = self.optimizer.to_beat() if self.racing else None
-        starts = self.starts(generation, len(genomes))
-        evaluations.append(
-            evaluate(self.engine, config.topology, genomes, starts, to_beat, met)
-        )
+        evaluations.append(self._evaluated(genomes, to_beat))
         self.optimizer.tell(evaluations[-1].fitness)
         # the worst there is, what NaN counts as, is no number for a mean
         stored = self.optimizer.fitness
         fitness = np.where(np.isneginf(stored), 0.0, stored)
         record = Record(
             generation=generation,
-            evaluations=spent + cost,
+            evaluations=spent,
             best=float(fitness.max()),
             mean=float(fitness.mean()),
             std=float(fitness.std()),
@@ -219,6 +208,32 @@ class Evolution:
         self.records.append(record)
         self.best_genomes.append(self.optimizer.population[fitness.argmax()].copy())
         return record
+
+    def _asked(self) -> tuple[np.ndarray, GivenLessons | None]:
+        """Genomes of the next generation, and the lessons that it has had, if any."""
+        cost = self.optimizer.next_cost()
+        genomes = self.optimizer.ask()
+        if cost <= len(genomes):
+            return genomes, None
+        lessons = self._lessons(self.optimizer.generation)
+        self.optimizer.learn_in_life(lessons)
+        genomes = self.optimizer.pending()
+        if lessons.cost != cost - len(genomes):
+            raise AskTellError(
+                f"expected lessons of {cost - len(genomes)} evaluations, "
+                f"got {lessons.cost}"
+            )
+        return genomes, lessons
+
+    def _evaluated(
+        self, genomes: np.ndarray, to_beat: np.ndarray | None = None
+    ) -> Evaluation:
+        """Evaluation of genomes, with the starts and robots of this generation."""
+        generation = self.optimizer.generation
+        starts = self.starts(generation, len(genomes))
+        met = self.disturbances(generation)
+        topology = self.config.topology
+        return evaluate(self.engine, topology, genomes, starts, to_beat, met)
 
     def _lessons(self, generation: int) -> GivenLessons:
         """The lessons of a generation, with starts and disturbances of their own."""

@@ -285,12 +285,12 @@ def _line(job: Job) -> str:
     if job.study is None:
         return str(job)
     from evolution.study.addresses import run_at
-    from evolution.study.packed_run import PackedRun
+    from evolution.study.finished_run import FinishedRun
 
     packed = run_at(job.study / job.name / job.directory.name)
     return (
         f"{job}: {packed.scores.in_short}"
-        if isinstance(packed, PackedRun)
+        if isinstance(packed, FinishedRun)
         else str(job)
     )
 

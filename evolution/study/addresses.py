@@ -14,9 +14,9 @@ from evolution.study.directory import PREFIX, RUNNING, StudyDirectory
 
 if TYPE_CHECKING:
     # pyarrow is slow to import
-    from evolution.study.packed_run import PackedRun
+    from evolution.study.finished_run import FinishedRun
 
-PlacedRun = Union[RunDirectory, "PackedRun"]
+PlacedRun = Union[RunDirectory, "FinishedRun"]
 """A run in its directory, finished or not, or one in the tables of a study."""
 
 

@@ -1,16 +1,13 @@
 """Data of a study: its finished runs, read from its tables."""
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from epuck_mj.errors import UserError
 from epuck_mj.host.yaml_and_json import read_json
-from epuck_mj.policies.file import ControllerFile
 from epuck_mj.policies.wall_follower import YARDSTICK
 from epuck_mj.scene.model_files import is_on_wheels, on_wheels
 from evolution.judging.held_out import tested_on
@@ -19,44 +16,7 @@ from evolution.run.directory import RunDirectory
 from evolution.settings.config import ExperimentConfig
 from evolution.study.config import StudyConfig, seeds_text
 from evolution.study.directory import StudyDirectory
-from evolution.study.packed_run import PackedRun, read_packed
-
-
-@dataclass(frozen=True, eq=False)
-class RunData:
-    """A finished run.
-
-    Attributes:
-        seed: its seed.
-        history: columns of its history by name, `(generations,)` each, as
-            `histories.History`.
-        champion: the champion.
-        scores: what it is worth.
-        path: `STUDY/EXPERIMENT/seed-N`, or the directory that it is still in.
-        provenance: of the run, as an entry of provenance.json.
-    """
-
-    seed: int
-    history: Mapping[str, np.ndarray]
-    champion: ControllerFile
-    scores: Scores
-    path: Path
-    provenance: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def control_steps(self) -> int | None:
-        """Control steps that the run took, None if it did not count them."""
-        steps = self.history.get("control_steps", np.zeros(0))
-        return int(np.nansum(steps)) or None
-
-    def held_out(self, robot: str) -> float:
-        """The champion's mean on the test starts."""
-        return self.scores.held_out[robot].mean
-
-    def held_out_as_evolved(self, robot: str) -> float:
-        """The champion's mean with disturbances as it evolved; nan if not tested so."""
-        test = self.scores.held_out_as_evolved.get(robot)
-        return math.nan if test is None else test.mean
+from evolution.study.finished_run import FinishedRun, read_finished
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +36,7 @@ class StudyData:
 
     path: Path
     configs: Mapping[str, ExperimentConfig]
-    runs: Mapping[str, tuple[RunData, ...]]
+    runs: Mapping[str, tuple[FinishedRun, ...]]
     robots: tuple[str, ...]
     steps: int
     yardstick: Mapping[str, HeldOut]
@@ -100,7 +60,7 @@ class StudyData:
         return on_wheels(next(iter(self.configs.values())).robot)
 
     @property
-    def with_runs(self) -> dict[str, tuple[RunData, ...]]:
+    def with_runs(self) -> dict[str, tuple[FinishedRun, ...]]:
         """The runs of the experiments that have any, in the study's order."""
         return {name: self.runs[name] for name in self.configs if self.runs.get(name)}
 
@@ -175,12 +135,12 @@ def load_study(path: Path) -> StudyData:
 
 def _finished(
     directory: StudyDirectory, config: StudyConfig
-) -> tuple[dict[str, tuple[RunData, ...]], list[str]]:
+) -> tuple[dict[str, tuple[FinishedRun, ...]], list[str]]:
     """The finished and valid runs of each experiment; what is missing, and why."""
     # before the tables: a run that is packed meanwhile is in these
     places = {name: list(directory.runs(name)) for name in config.experiments}
     packed, damaged = directory.tables.sound_runs(config)
-    runs: dict[str, tuple[RunData, ...]] = {}
+    runs: dict[str, tuple[FinishedRun, ...]] = {}
     missing: list[str] = []
     tested: tuple[str, ...] = ()
     asked = directory.asked_seeds()
@@ -201,7 +161,7 @@ def _finished(
                 )
                 _check_tests(run, experiment, tested)
                 tested = tuple(run.scores.held_out)
-                finished.append(_data(run))
+                finished.append(run)
             except UserError as error:
                 missing.append(f"{name} seed {seed}: {error}")
         runs[name] = tuple(finished)
@@ -216,24 +176,18 @@ def _finished(
 
 def _unpacked(
     places: Sequence[RunDirectory], name: str, config: ExperimentConfig
-) -> PackedRun:
+) -> FinishedRun:
     """A finished run that is not in the tables yet, from the first place that has it.
 
     Raises:
         UserError: if it is not finished, damaged, or of another config.
     """
     finished = [place for place in places if place.finished]
-    return read_packed((finished or places)[0], name, config)
-
-
-def _data(run: PackedRun) -> RunData:
-    return RunData(
-        run.seed, run.history, run.champion, run.scores, run.path, run.provenance
-    )
+    return read_finished((finished or places)[0], name, config)
 
 
 def _check_tests(
-    run: PackedRun, config: ExperimentConfig, tested: tuple[str, ...]
+    run: FinishedRun, config: ExperimentConfig, tested: tuple[str, ...]
 ) -> None:
     """Refuse a run that was tested on other robots than those before it.
 
@@ -264,7 +218,7 @@ def _tested_on(config: ExperimentConfig, scores: Scores) -> tuple[str, ...]:
     return tuple(Path(robot).name for robot in tested_on(config.robot))
 
 
-def _unpaired(runs: Mapping[str, tuple[RunData, ...]]) -> list[str]:
+def _unpaired(runs: Mapping[str, tuple[FinishedRun, ...]]) -> list[str]:
     """Lines about seeds that some experiments have and others lack."""
     seeds = {name: {run.seed for run in each} for name, each in runs.items()}
     everywhere = set().union(*seeds.values())

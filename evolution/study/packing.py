@@ -11,9 +11,9 @@ from epuck_mj.host import files
 from evolution.run.directory import RunDirectory
 from evolution.run.lock import LOCK, locked
 from evolution.study.directory import PATIENCE, RUNNING, StudyDirectory
+from evolution.study.finished_run import FinishedRun, read_finished
 from evolution.study.histories import RunKey
 from evolution.study.jobs import failure_log
-from evolution.study.packed_run import PackedRun, read_packed
 
 SHARE = 20
 """The next packing comes after this many times what the last one took."""
@@ -50,7 +50,7 @@ def pack(study: StudyDirectory) -> Packing:
         files.remove_leftovers(study.path)
         config, tables = study.stored_config(), study.tables
         known = tables.packed()
-        found: dict[RunKey, PackedRun] = {}
+        found: dict[RunKey, FinishedRun] = {}
         ready: list[RunDirectory] = []
         others: list[tuple[RunKey, RunDirectory]] = []
         left: list[str] = []
@@ -64,7 +64,7 @@ def pack(study: StudyDirectory) -> Packing:
                 else:
                     try:
                         asked = config.with_seed(name, seed)
-                        found[run] = read_packed(directory, name, asked)
+                        found[run] = read_finished(directory, name, asked)
                         ready.append(directory)
                     except UserError as error:
                         left.append(f"{name} seed {seed}: {error}")

@@ -14,6 +14,7 @@ from epuck_mj.policies.file import CHAMPIONS
 from evolution.run.history import table_text
 from evolution.study.columns import Row, rows_of, table_of
 from evolution.study.config import StudyConfig
+from evolution.study.finished_run import FinishedRun, run_of_row
 from evolution.study.histories import (
     SCHEMA,
     History,
@@ -23,7 +24,6 @@ from evolution.study.histories import (
     history_table,
     merged,
 )
-from evolution.study.packed_run import PackedRun, run_of_row
 from evolution.study.provenances import (
     read_provenances,
     together,
@@ -83,7 +83,7 @@ class Tables:
 
     def runs(
         self, config: StudyConfig, histories: bool = True
-    ) -> dict[RunKey, PackedRun]:
+    ) -> dict[RunKey, FinishedRun]:
         """The runs of a study's experiments, in the order of the table.
 
         Args:
@@ -100,7 +100,7 @@ class Tables:
 
     def sound_runs(
         self, config: StudyConfig, histories: bool = True
-    ) -> tuple[dict[RunKey, PackedRun], dict[RunKey, UserError]]:
+    ) -> tuple[dict[RunKey, FinishedRun], dict[RunKey, UserError]]:
         """The runs as `runs` gives them, and what is wrong with the rows of others.
 
         Raises:
@@ -109,7 +109,7 @@ class Tables:
         rows = self.rows()
         read = self.histories() if rows and histories else {}
         provenances, seconds = read_provenances(self.provenance), self.seconds()
-        found: dict[RunKey, PackedRun] = {}
+        found: dict[RunKey, FinishedRun] = {}
         damaged: dict[RunKey, UserError] = {}
         for row in rows:
             if ("experiment",) not in row or ("seed",) not in row:
@@ -140,7 +140,7 @@ class Tables:
         return found, damaged
 
     def add(
-        self, runs: Sequence[PackedRun], order: Sequence[str], again: bool = False
+        self, runs: Sequence[FinishedRun], order: Sequence[str], again: bool = False
     ) -> None:
         """Write finished runs into the tables.
 

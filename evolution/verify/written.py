@@ -20,7 +20,7 @@ from evolution.study.addresses import PlacedRun
 from evolution.study.directory import RUNNING, StudyDirectory
 
 if TYPE_CHECKING:
-    from evolution.study.packed_run import PackedRun
+    from evolution.study.finished_run import FinishedRun
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ def read_run(run: PlacedRun) -> Written:
     return _of_directory(run) if isinstance(run, RunDirectory) else _of_tables(run)
 
 
-def _of_tables(run: "PackedRun") -> Written:
+def _of_tables(run: "FinishedRun") -> Written:
     """What the tables of a study say of a run."""
     genome, highest = run.best_stored, run.scores.best_stored
     best = np.empty((0, run.champion.genome.size)), np.empty(0)

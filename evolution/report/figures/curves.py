@@ -24,7 +24,8 @@ from evolution.pages.style import (
 from evolution.pages.words import YARDSTICK_LABEL, label, robot_name
 from evolution.report.samples import TARGET_SHARES, hits
 from evolution.statistics.targets import ecdf
-from evolution.study.data import RunData, StudyData
+from evolution.study.data import StudyData
+from evolution.study.finished_run import FinishedRun
 
 N_POINTS = 150
 """Most points of a curve: more than print shows, few enough for small files."""
@@ -53,7 +54,7 @@ def on_grid(
     return values[np.searchsorted(evaluations, grid, side="right") - 1]
 
 
-def common_grid(runs: Sequence[RunData]) -> np.ndarray:
+def common_grid(runs: Sequence[FinishedRun]) -> np.ndarray:
     """Evaluations where curves of runs are compared, from where all of them began."""
     evaluations = [run.history["evaluations"] for run in runs]
     grid = np.unique(np.concatenate(evaluations))
@@ -63,7 +64,7 @@ def common_grid(runs: Sequence[RunData]) -> np.ndarray:
 
 
 def curves(
-    runs: Sequence[RunData], column: str, grid: np.ndarray, so_far: bool = False
+    runs: Sequence[FinishedRun], column: str, grid: np.ndarray, so_far: bool = False
 ) -> np.ndarray:
     """A column of the history of each run at `grid`, or its highest until then."""
     found = []

@@ -15,7 +15,8 @@ from evolution.judging.held_out_starts import starts_for_test
 from evolution.pages.style import PAGE, PRINT, with_count
 from evolution.pages.words import label
 from evolution.settings.config import ExperimentConfig
-from evolution.study.data import RunData, StudyData
+from evolution.study.data import StudyData
+from evolution.study.finished_run import FinishedRun
 
 TRIALS_SHOWN = 2
 """Trials shown of each champion."""
@@ -86,7 +87,7 @@ def _same_world(a: ExperimentConfig, b: ExperimentConfig) -> bool:
     return (a.arena, a.control_step, a.fitness) == (b.arena, b.control_step, b.fitness)
 
 
-def median_run(data: StudyData, name: str) -> RunData:
+def median_run(data: StudyData, name: str) -> FinishedRun:
     """The run of median held-out fitness on the wheeled robot, the lower of two."""
     robot = data.wheels if data.wheels in data.robots else data.robots[-1]
     order = np.argsort(data.held_out(name, robot), kind="stable")

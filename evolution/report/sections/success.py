@@ -13,7 +13,8 @@ from evolution.report.measures import shown_robots
 from evolution.report.samples import FOLLOWED
 from evolution.statistics.estimates import Interval, wilson
 from evolution.statistics.significance import FEWEST_FOR_STARS, LEVELS, fisher
-from evolution.study.data import RunData, StudyData
+from evolution.study.data import StudyData
+from evolution.study.finished_run import FinishedRun
 
 MATCHES = "matches the hand-written follower"
 FOLLOWS, KEEPS_OFF = "follows walls", "follows walls without hugging"
@@ -72,7 +73,7 @@ def _fisher_p(a: np.ndarray, b: np.ndarray) -> float:
     return fisher(int(a.sum()), a.size, int(b.sum()), b.size)
 
 
-def _criteria(data: StudyData, robot: str) -> dict[str, Callable[[RunData], bool]]:
+def _criteria(data: StudyData, robot: str) -> dict[str, Callable[[FinishedRun], bool]]:
     """What the data can tell of each run on a robot."""
     reference, found = data.yardstick_mean(robot), {}
     if reference is not None:

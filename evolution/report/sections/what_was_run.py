@@ -29,16 +29,7 @@ from evolution.study.data import StudyData
 
 def what_was_run_section(data: StudyData) -> list[Block]:
     """Title, what is missing, and the experiments."""
-    runs = data.with_runs
-    sizes = sorted({len(each) for each in runs.values()})
-    starts = {
-        test.starts
-        for name in runs
-        for robot in data.robots
-        for test in tests_of(data, name, robot)
-    }
-    n_starts = " or ".join(f"{n:,}" for n in sorted(starts))
-    blocks: list[Block] = [
+    return [
         Heading(f"Report of the study {data.path.as_posix()}", 1),
         Paragraph(
             "Evolution of wall following for an e-puck: a replication, with our own "
@@ -46,32 +37,55 @@ def what_was_run_section(data: StudyData) -> list[Block]:
             "with two variants of differential evolution."
         ),
         Heading("What is missing"),
+        *_missing(data),
+        Heading("What was run"),
+        Paragraph(_tests_in_words(data)),
+        *_experiments(data),
     ]
-    if data.missing:
-        blocks.append(Listing(data.missing))
-    else:
-        blocks.append(Paragraph("Nothing: all runs that were begun are finished."))
-    taken = {name: _steps(data, name) for name in data.configs}
-    scale, unit, units = scale_of(np.concatenate(list(taken.values())))
-    if sizes[0] < 2:
-        few = [label(data, name) for name, each in runs.items() if len(each) < 2]
+
+
+def _missing(data: StudyData) -> list[Block]:
+    few = [label(data, name) for name, each in data.with_runs.items() if len(each) < 2]
+    blocks: list[Block] = [
+        Listing(data.missing)
+        if data.missing
+        else Paragraph("Nothing: all runs that were begun are finished.")
+    ]
+    if few:
         blocks.append(
             Paragraph(
                 f"Only one run of {', '.join(few)}: one run does not show the spread "
                 "between runs, so there is no verdict."
             )
         )
-    blocks += [
-        Heading("What was run"),
-        Paragraph(
-            f"{numbered(sum(map(len, runs.values())), 'finished run')} of "
-            f"{numbered(len(runs), 'experiment')}. "
-            f"Evolved on {evolved_on(data)}. "
-            f"Each run's champion is tested on {n_starts} test starts, the same for "
-            "all and never used by evolution, with ideal sensors and motors, on the "
-            f"{' and the '.join(map(robot_name, shown_robots(data)))}. The unit is "
-            f"the run; fitness is at most {data.steps}, the control steps of a trial."
-        ),
+    return blocks
+
+
+def _tests_in_words(data: StudyData) -> str:
+    runs = data.with_runs
+    starts = {
+        test.starts
+        for name in runs
+        for robot in data.robots
+        for test in tests_of(data, name, robot)
+    }
+    n_starts = " or ".join(f"{n:,}" for n in sorted(starts))
+    return (
+        f"{numbered(sum(map(len, runs.values())), 'finished run')} of "
+        f"{numbered(len(runs), 'experiment')}. "
+        f"Evolved on {evolved_on(data)}. "
+        f"Each run's champion is tested on {n_starts} test starts, the same for "
+        "all and never used by evolution, with ideal sensors and motors, on the "
+        f"{' and the '.join(map(robot_name, shown_robots(data)))}. The unit is "
+        f"the run; fitness is at most {data.steps}, the control steps of a trial."
+    )
+
+
+def _experiments(data: StudyData) -> list[Block]:
+    """Table of the experiments, and what its columns mean."""
+    taken = {name: _steps(data, name) for name in data.configs}
+    scale, unit, units = scale_of(np.concatenate(list(taken.values())))
+    return [
         Table(
             (
                 *("experiment", "name", "seeds", "runs", "budget [evaluations]"),
@@ -106,7 +120,6 @@ def what_was_run_section(data: StudyData) -> list[Block]:
             f"the same.{_finalists(data)}"
         ),
     ]
-    return blocks
 
 
 def evolved_on(data: StudyData) -> str:

@@ -1,5 +1,6 @@
-"""A finished run in a study's tables, read from its directory or from its row."""
+"""A finished run of a study, read from its directory or from its row."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +24,7 @@ from evolution.study.provenances import provenance_of
 
 
 @dataclass(frozen=True, eq=False)
-class PackedRun:
+class FinishedRun:
     """What a study keeps of a finished run.
 
     Attributes:
@@ -57,10 +58,23 @@ class PackedRun:
         return self.config.seed
 
     @property
+    def control_steps(self) -> int | None:
+        """Control steps that the run took, None if it did not count them."""
+        steps = self.history.get("control_steps", np.zeros(0))
+        return int(np.nansum(steps)) or None
+
+    def held_out(self, robot: str) -> float:
+        """The champion's mean on the test starts."""
+        return self.scores.held_out[robot].mean
+
+    def held_out_as_evolved(self, robot: str) -> float:
+        """The champion's mean with disturbances as it evolved; nan if not tested so."""
+        test = self.scores.held_out_as_evolved.get(robot)
+        return math.nan if test is None else test.mean
+
+    @property
     def row(self) -> Row:
         """Its row of champions.parquet."""
-        steps = self.history["control_steps"]
-        known = steps[np.isfinite(steps)]
         row: Row = {
             ("experiment",): self.experiment,
             ("seed",): self.seed,
@@ -70,16 +84,16 @@ class PackedRun:
             ("genome",): self.champion.genome.tolist(),
             **score_values(self.scores),
         }
-        if known.size:
-            row["control_steps",] = int(known.sum())
+        if self.control_steps is not None:
+            row["control_steps",] = self.control_steps
         if self.best_stored is not None:
             row["best_stored", "genome"] = self.best_stored.tolist()
         return row
 
 
-def read_packed(
+def read_finished(
     directory: RunDirectory, experiment: str, config: ExperimentConfig
-) -> PackedRun:
+) -> FinishedRun:
     """A finished run from its directory.
 
     Args:
@@ -107,7 +121,7 @@ def read_packed(
         raise UserError(f"'{directory.champion}' is of another task or network")
     history, lost_counts = history_of(directory, Path(config.robot).name)
     genome, lost_genome = _best_stored(directory, history, config.topology.n_genes)
-    return PackedRun(
+    return FinishedRun(
         experiment=experiment,
         config=config,
         champion=champion,
@@ -150,7 +164,7 @@ def run_of_row(
     provenance: Mapping[str, Any],
     history: History,
     seconds: float,
-) -> PackedRun:
+) -> FinishedRun:
     """A run from its row.
 
     Args:
@@ -187,7 +201,7 @@ def run_of_row(
         scores=scores.to_dict(),
     )
     best = row.get(("best_stored", "genome"))
-    return PackedRun(
+    return FinishedRun(
         experiment=experiment,
         config=config,
         champion=champion,
