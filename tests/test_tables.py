@@ -314,8 +314,11 @@ def test_a_damaged_row_takes_no_report_down(study):
     said = "\n".join(data.missing)
     for words in ("de-best seed 2: ", "de-best seed 10: ", "ga seed 1: ", "genes"):
         assert words in said
+    sound = run_at(study.path / "ga" / "seed-2")
+    assert not isinstance(sound, RunDirectory)
+    assert sound.seed == 2
     with pytest.raises(UserError, match=r"expected .* finite genes"):
-        run_at(study.path / "ga" / "seed-2")
+        run_at(study.path / "de-best" / "seed-2")
 
 
 # reading

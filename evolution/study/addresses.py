@@ -42,8 +42,8 @@ def runs_at(place: Path, histories: bool = False) -> list[PlacedRun]:
         return []
     if not _has_tables(study):
         return []
-    found = study.tables.runs(study.stored_config(), histories)
-    return [found[run] for run in [(name, int(number))] if run in found]
+    found = study.tables.runs(study.stored_config(), histories, (name, int(number)))
+    return list(found.values())
 
 
 def champion_at(place: str | Path) -> ControllerFile:

@@ -7,6 +7,9 @@ A run is in the tables if champions.parquet, which is written last, has its row.
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import pyarrow as pa
+import pyarrow.compute as pc
+
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.csv_text import csv_columns, csv_text
@@ -52,12 +55,12 @@ class Tables:
         """
         if not files.is_file(self.champions):
             return set()
-        table = read_table(self.champions, ("experiment", "seed"), some=True)
-        columns = (table[name].to_pylist() for name in ("experiment", "seed"))
+        table = read_table(self.champions, KEYS, some=True)
+        columns = (table[name].to_pylist() for name in KEYS)
         return set(zip(*columns, strict=True))
 
-    def rows(self) -> list[Row]:
-        """The rows of champions.parquet; none if there is no such file.
+    def rows(self, only: RunKey | None = None) -> list[Row]:
+        """The rows of champions.parquet, or of one run; none if there is no such file.
 
         Raises:
             UserError: if it is damaged.
@@ -65,7 +68,7 @@ class Tables:
         if not files.is_file(self.champions):
             return []
         try:
-            return rows_of(read_table(self.champions))
+            return rows_of(_of_run(read_table(self.champions), only))
         except (ValueError, TypeError) as error:
             raise UserError(f"'{self.champions}' is damaged: {error}") from None
 
@@ -82,31 +85,38 @@ class Tables:
             raise UserError(f"'{self.history}' is damaged: {error}") from None
 
     def runs(
-        self, config: StudyConfig, histories: bool = True
+        self,
+        config: StudyConfig,
+        histories: bool = True,
+        only: RunKey | None = None,
     ) -> dict[RunKey, FinishedRun]:
         """The runs of a study's experiments, in the order of the table.
 
         Args:
             config: of the study.
             histories: whether to read these, too.
+            only: the run that is asked for; None for all.
 
         Raises:
-            UserError: if anything in the tables is damaged.
+            UserError: if the tables, or the rows that are asked for, are damaged.
         """
-        found, damaged = self.sound_runs(config, histories)
+        found, damaged = self.sound_runs(config, histories, only)
         for error in damaged.values():
             raise error
         return found
 
     def sound_runs(
-        self, config: StudyConfig, histories: bool = True
+        self,
+        config: StudyConfig,
+        histories: bool = True,
+        only: RunKey | None = None,
     ) -> tuple[dict[RunKey, FinishedRun], dict[RunKey, UserError]]:
         """The runs as `runs` gives them, and what is wrong with the rows of others.
 
         Raises:
             UserError: if a table as a whole is damaged.
         """
-        rows = self.rows()
+        rows = self.rows(only)
         read = self.histories() if rows and histories else {}
         provenances, seconds = read_provenances(self.provenance), self.seconds()
         found: dict[RunKey, FinishedRun] = {}
@@ -194,7 +204,18 @@ class Tables:
             raise UserError(f"'{self.timing}' is damaged: {error}") from None
 
 
-TIMING = ("experiment", "seed", "seconds")
+def _of_run(champions: pa.Table, run: RunKey | None) -> pa.Table:
+    """The rows of a run; all if none is given."""
+    if run is None:
+        return champions
+    name, seed = (pc.field(key) == value for key, value in zip(KEYS, run, strict=True))
+    return champions.filter(name & seed)
+
+
+KEYS = ("experiment", "seed")
+"""Columns of champions.parquet that name a run."""
+
+TIMING = (*KEYS, "seconds")
 """Columns of timing.csv."""
 
 
