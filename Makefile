@@ -10,6 +10,8 @@ CHAMPION := results/paper/de-best/seed-1
 PAPERS := de-best de-rand ga
 ROBUST := 1 2 3 4 5 6 7 8 9 10
 NETWORKS := robust-feedforward-changes robust-feedforward
+FOR_ROBOTS := $(ROBUST:%=results/real-robots/robust/seed-%) \
+  $(foreach seed,1 2 3,$(NETWORKS:%=results/real-robots/%/seed-$(seed))) wall-follower
 
 .PHONY: run test docs docs-serve bench ladder convergence racing overhead recording bridge fleet ppo gap results figures clean
 
@@ -72,13 +74,15 @@ ppo: $(INSTALLED)
 	  --json results/ppo/test.json
 	$(BIN)/python -m benchmarks.ppo.figure
 
-# champions in other worlds, kinematic and on wheels; fast ones are also driven slower
+# champions in other worlds, kinematic and on wheels; fast ones are also driven slower.
+# An hour on two cores. Then only worlds in which the gains of the sensors are known
 gap: $(INSTALLED)
 	$(BIN)/python -m evolution.gap \
 	  $(foreach seed,1 2 3,$(PAPERS:%=results/paper/%/seed-$(seed))) \
-	  results/transfer $(ROBUST:%=results/real-robots/robust/seed-%) \
-	  $(foreach seed,1 2 3,$(NETWORKS:%=results/real-robots/%/seed-$(seed))) \
-	  wall-follower --starts 10 --speeds 0.04 0.08 --output results/gap
+	  results/transfer $(FOR_ROBOTS) --starts 10 --speeds 0.04 0.08 \
+	  --kinds usual beyond corners --output results/gap
+	$(BIN)/python -m evolution.gap $(FOR_ROBOTS) --starts 20 --speeds 0.08 \
+	  --kinds calibrated --output results/gap-calibrated
 
 # what git keeps of the studies in runs/, and everything that is made of it
 results: $(INSTALLED)

@@ -83,6 +83,9 @@ def test_a_hypercube_covers_every_range_evenly(kind):
             continue
         values = np.array([getattr(world, name) for world in found])
         ends = np.array([low, high])
+        if low == high:
+            assert (values == low).all(), name
+            continue
         if name in LOGARITHMS:
             values, ends = np.log(values), np.log(ends)
         part = np.floor((values - ends[0]) / np.ptp(ends) * n).astype(int)
@@ -111,6 +114,18 @@ def test_ranges_half_as_wide_again_are_those_of_robots_that_can_be():
     # what worlds share with robots that evolution randomises
     for name in ("body_radius", "set_back", "light", "battery", "slipping", "grip"):
         assert WORLD_RANGES[name] == getattr(ALL_RANGES, name)
+
+
+def test_calibrated_gains_differ_from_the_published_ones_by_about_a_tenth():
+    places = worlds(100, "calibrated")
+    factors = np.log([met(world, 2, 1).gains[0] for world in places])
+    common = factors.mean(axis=1)
+    # eight sensors' own gains do not cancel each other
+    assert np.log(1.1) / 2 < np.abs(common).max() < 2 * np.log(1.1)
+    assert np.log(1.1) / 4 < np.std(factors - common[:, None]) < np.log(1.1)
+    same = set(WORLD_RANGES) - {"curve", "light", "gain_spread"}
+    for name in same:
+        assert KINDS["calibrated"].ranges[name] == WORLD_RANGES[name], name
 
 
 def test_starts_differ_from_world_to_world(monkeypatch):
@@ -414,14 +429,14 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
     assert {
         kind: len(each) for kind, each in record["worlds"].items()
     } == dict.fromkeys(KINDS, 3)
-    kinds = record["robots"]["epuck_kinematic"]
+    kinds_of = record["robots"]["epuck_kinematic"]
     slow = "wall-follower at 0.04 m/s"
-    assert list(kinds["usual"])[:3] == ["wall-follower", slow, str(CHAMPION)]
+    assert list(kinds_of["usual"])[:3] == ["wall-follower", slow, str(CHAMPION)]
     rows = pd.read_parquet(output / "gap.parquet").to_dict("records")
     assert len(rows) == 4 * 3 * len(KINDS)
     for row in rows:
         kind, world = row["kind"], row["number"]
-        policy = kinds[kind][row["policy"]]
+        policy = kinds_of[kind][row["policy"]]
         there = policy["in_worlds"]["fitness"][world]
         share = there / max(policy["nominal"], policy["ideal"][world])
         assert row["share"] == pytest.approx(share, abs=1e-4)
@@ -431,6 +446,15 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
         assert row["arena"] == record["worlds"][kind][world]["arena"]
     assert imread(output / "gap.png").shape[1] > 1000
     first = (output / "gap.json").read_bytes()
+    some = tmp_path / "some"
+    kinds = ["--kinds", "calibrated", "corners", "calibrated"]
+    assert measure_gap([*arguments[:3], str(some), *small, *kinds]) == 0
+    fewer = json.loads((some / "gap.json").read_text())["robots"]["epuck_kinematic"]
+    assert fewer == {kind: kinds_of[kind] for kind in ("calibrated", "corners")}
+    page = (some / "gap.md").read_text()
+    assert "Worlds with calibrated gains have" in page
+    assert "sual worlds" not in page
+    assert "(gains calibrated to 10 %)" in page
     monkeypatch.setattr("evolution.gap.gap_folder.write_figure", lambda *_: None)
     assert measure_gap([*arguments, *small]) == 0
     assert (output / "gap.json").read_bytes() == first
@@ -450,6 +474,10 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
             "from 2 to 1,000, got 0",
         ),
         (["wall-follower", "--threads", "-1"], "threads"),
+        (
+            ["wall-follower", "--kinds", "usual", "odd"],
+            "no kind of worlds 'odd'; available: usual, beyond, corners, calibrated",
+        ),
         (["wall-follower", "--speeds", "0.04", "-1"], "--speeds.*, got -1"),
         (["wall-follower", "--speeds", "3"], "--speeds.*got 3"),
         (["wall-follower", "--robot", "tank"], "no robot 'tank'"),

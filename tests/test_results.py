@@ -22,7 +22,7 @@ from evolution.run.directory import RunDirectory
 from evolution.study.addresses import run_at, runs_at
 from evolution.study.config import StudyConfig, find_study
 from evolution.study.data import load_study
-from evolution.study.packed_run import PackedRun
+from evolution.study.finished_run import FinishedRun
 
 ROOT = MODELS.parent
 RESULTS = ROOT / "results"
@@ -42,7 +42,7 @@ def test_runs_are_of_code_in_git_and_finished():
     assert not strays, f"{len(strays)} strays: {strays}"
 
 
-def strays_of(run: PackedRun) -> list[str]:
+def strays_of(run: FinishedRun) -> list[str]:
     """What is wrong with a shipped run, a line each."""
     provenance = run.provenance
     # however often it was gone on with
@@ -77,7 +77,9 @@ def test_a_study_is_the_shipped_config(path: Path):
     assert StudyConfig.from_yaml(path / "study.yaml").experiments == now.experiments
 
 
-@pytest.mark.parametrize("name", ["hybrids", "good-robot", "variations", "real-robots"])
+@pytest.mark.parametrize(
+    "name", ["hybrids", "good-robot", "variations", "real-robots", "climbing"]
+)
 def test_further_studies_are_shipped_configs(name: str):
     study = load_study(RESULTS / name)
     now = StudyConfig.load(find_study(name)).experiments
@@ -147,10 +149,12 @@ def test_what_is_shipped_is_small():
     assert sum(p.stat().st_size for p in RESULTS.rglob("*") if p.is_file()) < SIZE_MAX
 
 
-def test_the_gap_s_documents_say_what_was_measured(monkeypatch):
+@pytest.mark.parametrize("folder", ["gap", "gap-calibrated"])
+def test_the_gap_s_documents_say_what_was_measured(folder, monkeypatch):
     monkeypatch.chdir(ROOT)
-    record = json.loads((RESULTS / "gap" / "gap.json").read_text())
-    names = list(next(iter(record["robots"].values()))["usual"])
+    record = json.loads((RESULTS / folder / "gap.json").read_text())
+    kinds = next(iter(record["robots"].values()))
+    names = list(next(iter(kinds.values())))
     policies = named_again(names)
     gaps = []
     for kind, worlds in record["worlds"].items():
@@ -174,9 +178,10 @@ def test_the_gap_s_documents_say_what_was_measured(monkeypatch):
             np.array([world["latency"] for world in worlds]),
         )
         gaps.append(gap)
-    assert (RESULTS / "gap" / "gap.md").read_text() == to_markdown(gap_document(gaps))
+    document = to_markdown(gap_document(gaps))
+    assert (RESULTS / folder / "gap.md").read_text() == document
     table = to_markdown([gap_summary(gaps)])
-    assert (RESULTS / "gap" / "summary.md").read_text() == table
+    assert (RESULTS / folder / "summary.md").read_text() == table
 
 
 def named_again(names: list[str]) -> list[NamedPolicy]:

@@ -14,6 +14,7 @@ from epuck_mj.host.files import check_writable, writing
 from epuck_mj.host.limits import check_flag
 from epuck_mj.scene.model_files import without_physics
 from evolution.gap.slowed import with_slowed
+from evolution.gap.worlds import KINDS
 from evolution.named_policies import common_wheels, policies_of
 
 EXAMPLES = (
@@ -30,6 +31,8 @@ class GapOptions:
     Attributes:
         paths: run or study directories, controller files, or wall-follower.
         output: folder for gap.md, summary.md, gap.json, gap.parquet and figures.
+        kinds: kinds of worlds: usual, beyond, corners, calibrated; all if not given.
+            The first given is the one of shares, latencies and ranks.
         worlds: number of worlds of each kind.
         starts: number of test starts in each world and in the arena of evolution.
         robot: robot that drives; if not given, the one that all evolved on, kinematic
@@ -40,6 +43,7 @@ class GapOptions:
 
     paths: tyro.conf.Positional[Annotated[tuple[str, ...], word("RUN")]]
     output: Annotated[Path, word("FOLDER")]
+    kinds: tuple[str, ...] = ()
     worlds: int = 100
     starts: int = 20
     robot: Annotated[str | None, word("ROBOT")] = None
@@ -50,6 +54,12 @@ class GapOptions:
 def measure_gap(argv: Sequence[str]) -> int:
     """Run the command line and return its exit status."""
     options = parse(GapOptions, "python -m evolution.gap", argv, examples=EXAMPLES)
+    unknown = [kind for kind in options.kinds if kind not in KINDS]
+    if unknown:
+        raise UserError(
+            f"no kind of worlds '{unknown[0]}'; available: {', '.join(KINDS)}"
+        )
+    kinds = tuple(dict.fromkeys(options.kinds)) or tuple(KINDS)
     check_flag("worlds", options.worlds)
     check_flag("starts", options.starts, "worlds")
     for speed in options.speeds:
@@ -79,6 +89,7 @@ def measure_gap(argv: Sequence[str]) -> int:
         options.output,
         policies,
         robots,
+        kinds,
         options.worlds,
         options.starts,
         options.threads,

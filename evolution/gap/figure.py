@@ -15,7 +15,12 @@ from evolution.gap.worlds import KINDS
 from evolution.pages.style import PAGE, PRINT, legend_below
 from evolution.pages.words import robot_name
 
-MARKS = (("o", colors.BLUE), ("s", colors.VERMILION), ("^", colors.GREEN))
+MARKS = {
+    "usual": ("o", colors.BLUE),
+    "beyond": ("s", colors.VERMILION),
+    "corners": ("^", colors.GREEN),
+    "calibrated": ("D", colors.PURPLE),
+}
 """Marker and colour of each kind of worlds."""
 
 APART = 0.22
@@ -46,7 +51,7 @@ def gap_figure(gaps: Sequence[Gap], names: Mapping[str, str]) -> Figure:
                     values = getattr(gap.transfers[robot], what).mean(axis=0)
                     own = [values[of] for of in gap.groups.values()]
                     y = np.arange(len(rows)) + APART * (i - (len(gaps) - 1) / 2)
-                    marker, color = MARKS[i]
+                    marker, color = MARKS[gap.kind]
                     low, high = ([f(each) for each in own] for f in (np.min, np.max))
                     axes.hlines(y, low, high, color=fraction(color), lw=0.8)
                     (line,) = axes.plot(

@@ -98,6 +98,7 @@ def by_latency(gap: Gap) -> Table:
 def gap_document(gaps: Sequence[Gap]) -> list[Block]:
     """Blocks of the document about the gap, in worlds of each kind."""
     first = gaps[0]
+    title = KINDS[first.kind].title
     blocks: list[Block] = [
         Heading("The reality gap", 1),
         Paragraph(
@@ -106,33 +107,26 @@ def gap_document(gaps: Sequence[Gap]) -> list[Block]:
             "which differ from world to world. In each column: mean step fitness, and "
             "the share of the trials that end in a crash. The nominal fitness is "
             "that with ideal sensors and motors, in the arena that a policy evolved "
-            "in, from as many test starts. Kept is the fitness in the first kind of "
+            "in, from as many test starts. Kept is the fitness in the first column's "
             "worlds as a share of the nominal fitness."
         ),
         gap_summary(gaps),
         Paragraph(
             "Each number is the median over the policies of an experiment of their "
-            "means. Usual worlds share ranges with evolution: those of wheel radius, "
-            "track, mass, friction and latency with randomise, and those of body, "
-            "sensors' place, light, battery and slipping start with randomise_all as "
-            "well. Policies that evolved on such robots have met such differences "
-            "before. In the second kind, every range that can be wider is half as wide "
-            "again. The third kind has the usual ranges, in the arenas "
-            + ", ".join(KINDS["corners"].arenas)
-            + "."
+            "means. " + " ".join(KINDS[gap.kind].about for gap in gaps)
         ),
         Heading("Latency"),
         Paragraph(
-            "Fitness and crashes in the usual worlds where commands reach the wheels "
-            "this many control steps late."
+            "Fitness and crashes where commands reach the wheels this many control "
+            f"steps late ({title})."
         ),
         by_latency(first),
         Heading("What is kept"),
         Paragraph(
-            "In the usual worlds. Kept is the fitness in the world as a share of a "
-            "reference: the nominal fitness, or the fitness of an ideal robot in the "
-            "world's arena if that is higher (in a smaller arena, robots find walls "
-            "sooner). A slow policy has little to lose. A policy masters a world if it "
+            f"Kept ({title}) is the fitness in the world as a share of a reference: "
+            "the nominal fitness, or the fitness of an ideal robot in the world's "
+            "arena if that is higher (in a smaller arena, robots find walls sooner). A "
+            "slow policy has little to lose. A policy masters a world if it "
             f"keeps at least {SHARE_KEPT:.0%} and has fewer than {COLLISIONS_MAX:g} "
             "collision per minute. Against nominal: worlds mastered if the reference "
             "is always the nominal fitness."
@@ -150,8 +144,8 @@ def gap_document(gaps: Sequence[Gap]) -> list[Block]:
                 for group, members in gap.groups.items()
                 for i in members
             ]
-            title = f"{robot}, {KINDS[gap.kind].title}"
-            blocks += [Heading(title), Table(COLUMNS, rows, texts=2)]
+            heading = Heading(f"{robot}, {KINDS[gap.kind].title}")
+            blocks += [heading, Table(COLUMNS, rows, texts=2)]
     return [*blocks, *_ranks(first)]
 
 

@@ -17,7 +17,7 @@ from evolution.gap.gap_document import gap_document, gap_summary
 from evolution.gap.groups import experiments, labels, peers
 from evolution.gap.outcomes import Outcome, ideal, in_worlds
 from evolution.gap.transfer import Gap, Transfer, verdict
-from evolution.gap.worlds import KINDS, World, worlds
+from evolution.gap.worlds import World, worlds
 from evolution.named_policies import NamedPolicy
 from evolution.pages.blocks import to_markdown
 from evolution.pages.figure_files import write_figure
@@ -39,6 +39,7 @@ def write_gap(
     folder: Path,
     policies: Sequence[NamedPolicy],
     robots: Sequence[str],
+    kinds: Sequence[str],
     n_worlds: int,
     starts: int,
     threads: int,
@@ -49,6 +50,7 @@ def write_gap(
         folder: an existing one.
         policies: who is tested.
         robots: that drive.
+        kinds: of worlds, names in `KINDS`; the first counts most.
         n_worlds: how many of each kind.
         starts: test starts in each world, and in nominal conditions.
         threads: threads that step the robots; 0 is one per core.
@@ -56,7 +58,7 @@ def write_gap(
     Raises:
         UserError: if a robot or an arena cannot be used, or a file not be written.
     """
-    places = {kind: worlds(n_worlds, kind) for kind in KINDS}
+    places = {kind: worlds(n_worlds, kind) for kind in kinds}
     measured = {
         robot: _measured(policies, places, robot, starts, threads) for robot in robots
     }

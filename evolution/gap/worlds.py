@@ -143,21 +143,58 @@ class Kind:
 
     Attributes:
         title: for readers.
+        about: a sentence for readers: what sets them apart.
         ranges: of their quantities.
         arenas: that they are in, as often each.
     """
 
     title: str
+    about: str
     ranges: Mapping[str, tuple[float, float]]
     arenas: Sequence[str]
 
 
+CALIBRATED_GAIN = 1.1
+"""What a calibration leaves of gains, as a factor: of all sensors, and of each."""
+
+CALIBRATED_RANGES: Mapping[str, tuple[float, float]] = {
+    **WORLD_RANGES,
+    "curve": (1 / CALIBRATED_GAIN, CALIBRATED_GAIN),
+    "gain_spread": (0.0, float(np.log(CALIBRATED_GAIN))),
+    "light": (1.0, 1.0),
+}
+
 KINDS: Mapping[str, Kind] = {
-    "usual": Kind("usual worlds", WORLD_RANGES, ARENAS),
-    "beyond": Kind(
-        "ranges half as wide again", half_as_wide_again(WORLD_RANGES), ARENAS
+    "usual": Kind(
+        "usual worlds",
+        "Usual worlds share ranges with evolution: those of wheel radius, track, mass, "
+        "friction and latency with randomise, and those of body, sensors' place, "
+        "light, battery and slipping start with randomise_all as well. Policies that "
+        "evolved on such robots have met such differences before.",
+        WORLD_RANGES,
+        ARENAS,
     ),
-    "corners": Kind("outer corners and posts", WORLD_RANGES, CORNERS),
+    "beyond": Kind(
+        "ranges half as wide again",
+        "In worlds with ranges half as wide again, every range is wider that can be.",
+        half_as_wide_again(WORLD_RANGES),
+        ARENAS,
+    ),
+    "corners": Kind(
+        "outer corners and posts",
+        "Worlds with outer corners and posts have the usual ranges, in the arenas "
+        f"{', '.join(CORNERS)}.",
+        WORLD_RANGES,
+        CORNERS,
+    ),
+    "calibrated": Kind(
+        "gains calibrated to 10 %",
+        "Worlds with calibrated gains have the usual ranges but for the sensors: the "
+        "gain of all of them, light included, is right to 10 %, and the gain of each "
+        "has a standard deviation of up to 10 % more.",
+        CALIBRATED_RANGES,
+        ARENAS,
+    ),
 }
 """Kinds of worlds by name; the first are those of the headline."""
 

@@ -27,18 +27,24 @@ TRANSFER, REAL_ROBOTS = "transfer", "real-robots"
 VARIATIONS = ("variations", "steps-150", "steps-500")
 """Studies of the paper's algorithms with one thing changed at a time."""
 
+CLIMBING = "climbing"
+"""The study of what evaluations on wheels are worth; it has a table."""
+
 HYBRIDS, GOOD_ROBOT = "hybrids", "good-robot"
 """Studies of evolution that learns, and of the experiment `best`; they have a page."""
 
-OTHERS = (TRANSFER, REAL_ROBOTS, HYBRIDS, GOOD_ROBOT)
+OTHERS = (TRANSFER, REAL_ROBOTS, HYBRIDS, GOOD_ROBOT, CLIMBING)
 """All that are not reported."""
+
+GAPS = ("gap", "gap-calibrated")
+"""Folders of the reality gap: in all worlds, and with calibrated gains."""
 
 PAGES: Mapping[str, tuple[str, ...]] = {
     "README.md": ("medians",),
     "docs/champions.md": ("champions",),
-    "docs/findings.md": ("paper", "wheels"),
+    "docs/findings.md": ("paper", "wheels", CLIMBING),
     "docs/variations.md": ("variations",),
-    "docs/transfer.md": ("gap", REAL_ROBOTS),
+    "docs/transfer.md": (*GAPS, REAL_ROBOTS),
     "docs/hybrids.md": (HYBRIDS, GOOD_ROBOT),
 }
 """Pages that show results, and the names of their tables."""
@@ -138,6 +144,7 @@ def _tables(results: Path) -> dict[str, str]:
     from evolution.hybrids.hybrids_page import worth_table
     from evolution.pages.blocks import to_markdown
     from evolution.reproduce.champions_table import champions_table
+    from evolution.reproduce.climbing_table import climbing_table
     from evolution.reproduce.real_robots_table import real_robots_table
     from evolution.reproduce.reproduction import medians_table, runs_table
     from evolution.study.data import load_study
@@ -154,6 +161,7 @@ def _tables(results: Path) -> dict[str, str]:
         REAL_ROBOTS: real_robots_table,
         HYBRIDS: worth_table,
         GOOD_ROBOT: worth_table,
+        CLIMBING: climbing_table,
     }
     for name in OTHERS:
         if (results / name).is_dir():
@@ -164,9 +172,10 @@ def _tables(results: Path) -> dict[str, str]:
     if varied := _variations(results):
         found = orders(varied_of([load_study(path) for path in varied]))
         tables["variations"] = to_markdown([orders_table(found)])
-    gap = results / "gap" / "summary.md"
-    if gap.exists():
-        tables["gap"] = gap.read_text(encoding="utf-8")
+    for name in GAPS:
+        gap = results / name / "summary.md"
+        if gap.exists():
+            tables[name] = gap.read_text(encoding="utf-8")
     return tables
 
 

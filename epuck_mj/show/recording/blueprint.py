@@ -24,18 +24,14 @@ PLOTTED_COUNTS = 4096
 def blueprint(
     scene: Scene, trials: Sequence["Trial"], places: Sequence[Entities]
 ) -> rrb.Blueprint:
-    """Arena and phases on the left, plots and summary on the right."""
+    """Arena on the left, plots and summary on the right, phases below both."""
     lanes = rrb.StateTimelineView(
         contents=[place.phase for place in places], name="Phase"
     )
     # a lane each, and their axis
     share = min(0.08 + 0.045 * len(places), 0.5)
     # paths are strips of one step each, shown from the start to the cursor
-    left = rrb.Vertical(
-        arena_view(scene, [place.path for place in places]),
-        lanes,
-        row_shares=[1 - share, share],
-    )
+    arena = arena_view(scene, [place.path for place in places])
     hidden = [trial.trajectory.hidden.shape[1] > 0 for trial in trials]
     alone = len(trials) == 1
     tabs = [] if alone else [_comparison(trials, places)]
@@ -44,7 +40,12 @@ def blueprint(
         tabs += own if alone else [rrb.Tabs(*own, name=place.name)]
     text = rrb.TextDocumentView(origin="summary", name="Summary")
     return rrb.Blueprint(
-        rrb.Horizontal(left, rrb.Tabs(*tabs, text), column_shares=[3, 2]),
+        rrb.Vertical(
+            rrb.Horizontal(arena, rrb.Tabs(*tabs, text), column_shares=[3, 2]),
+            # as wide as can be: short phases have room for their names
+            lanes,
+            row_shares=[1 - share, share],
+        ),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.TimePanel(state="collapsed", timeline=TIMELINE),
