@@ -9,8 +9,10 @@ from pathlib import Path
 os.environ["CI"] = "1"
 os.environ["RERUN_STRICT"] = "1"
 
-# as in the project's commands: MuJoCo and dm_control look for no display
+# as in the project's commands: MuJoCo and dm_control look for no display, and the
+# linear algebra of small matrices runs on one thread
 os.environ.setdefault("MUJOCO_GL", "disabled")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import pytest

@@ -287,9 +287,8 @@ def test_wheels_that_slip():
     assert fit.errors[OWN_TRACK] > 0.003
 
 
-def test_more_of_a_drive_tells_more(tmp_path):
-    own = another_robot(4)
-    trajectory = driven(own)
+def test_more_of_a_drive_tells_more(a_drive, tmp_path):
+    trajectory, _ = a_drive
     whole = found_in(trajectory, tmp_path)
     n = 200
     half = drive_of(trajectory, tmp_path)

@@ -489,7 +489,7 @@ def test_robots_that_fail_stop_alone(kinematic, tmp_path, faults, status):
     for chance in (3, 2, 1):
         with (
             robots(kinematic, tmp_path, "", *[""] * len(faults), "") as there,
-            python_process(*command(there, log, "--seconds", "5")) as process,
+            python_process(*command(there, log, "--seconds", "3")) as process,
         ):
             wait_for(lambda there=there: all_move(there), "all drove")
             emulators = list(there.values())
@@ -504,13 +504,13 @@ def test_robots_that_fail_stop_alone(kinematic, tmp_path, faults, status):
         if chance == 1 or error.count("error: ") == len(faults):
             break
     assert process.returncode == status
-    assert driven(log, "robot-1").steps == driven(log, last).steps == 50
+    assert driven(log, "robot-1").steps == driven(log, last).steps == 30
     lines = error.splitlines()
     for number, (line, fault) in enumerate(zip(lines, faults, strict=True), start=2):
         assert line.startswith(f"error: robot-{number}: {FAULTS[fault]}")
         # it is said at once, and the others drive on
         assert f"robot-{number}: error: " in out.partition(f"{last}: ended")[0]
-        assert 0 < driven(log, f"robot-{number}").steps < 45
+        assert 0 < driven(log, f"robot-{number}").steps < 25
 
 
 def drivers(parent: int) -> list[int]:
