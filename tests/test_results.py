@@ -19,9 +19,9 @@ from evolution.pages.blocks import to_markdown
 from evolution.reproduce.champions_table import champions_table
 from evolution.reproduce.publish import PAGES, pages_with_tables, shipped
 from evolution.run.directory import RunDirectory
+from evolution.study import data
 from evolution.study.addresses import run_at, runs_at
 from evolution.study.config import StudyConfig, find_study
-from evolution.study.data import load_study
 from evolution.study.finished_run import FinishedRun
 
 ROOT = MODELS.parent
@@ -40,6 +40,10 @@ def test_runs_are_of_code_in_git_and_finished():
     strays = [stray for run in runs for stray in strays_of(run)]
     assert len(runs) > 80
     assert not strays, f"{len(strays)} strays: {strays}"
+
+
+load_study = functools.cache(data.load_study)
+"""Nothing in results/ changes while tests run."""
 
 
 def strays_of(run: FinishedRun) -> list[str]:

@@ -34,15 +34,24 @@ SEEDS = {"de-best": [1, 2, 10], "ga": [1, 2]}
 TABLES = ("champions.parquet", "history.parquet")
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    """Two equal studies, of which one is packed."""
+    folder = tmp_path_factory.mktemp("studies")
+    write_study(folder / "study", SEEDS, packed=False)
+    write_study(folder / "packed", SEEDS)
+    return folder
+
+
 @pytest.fixture
-def unpacked(tmp_path) -> StudyDirectory:
+def unpacked(made, tmp_path) -> StudyDirectory:
     """A study that was killed before it packed its finished runs."""
-    return StudyDirectory(write_study(tmp_path / "study", SEEDS, packed=False))
+    return StudyDirectory(shutil.copytree(made / "study", tmp_path / "study"))
 
 
 @pytest.fixture
-def study(tmp_path) -> StudyDirectory:
-    return StudyDirectory(write_study(tmp_path / "packed", SEEDS))
+def study(made, tmp_path) -> StudyDirectory:
+    return StudyDirectory(shutil.copytree(made / "packed", tmp_path / "packed"))
 
 
 def contents(study: StudyDirectory) -> dict[str, bytes]:
