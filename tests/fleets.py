@@ -13,6 +13,7 @@ import numpy as np
 
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Pty, Tcp
+from epuck_mj.bridge.fake.scenarios import scenario
 from tests.test_fake import living, wait_for
 
 
@@ -27,6 +28,13 @@ def robots(scene, folder: Path, *faults: str, kind="tcp") -> Iterator[dict]:
             emulator = stack.enter_context(living(port, scene, start, faults=fault))
             there[port.name] = emulator
         yield there
+
+
+def befall(emulator: Emulator, fault: str) -> None:
+    """Let it happen now, however long the robot had to wait until it drove."""
+    assert emulator._begun is not None
+    now = time.monotonic() - emulator._begun
+    emulator._faults = scenario(fault.format(f"{now:.3f}"))
 
 
 class Terminal:

@@ -6,6 +6,7 @@ ends in another way than by itself; elsewhere in this one, which saves its impor
 
 import contextlib
 import io
+import itertools
 import os
 import pty
 import re
@@ -26,6 +27,7 @@ from rerun.chunk import RrdReader
 from epuck_mj.bridge.__main__ import bridge
 from epuck_mj.bridge.drive import alone
 from epuck_mj.bridge.drive.console import drive_summary, live_line
+from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Pty, Tcp
 from epuck_mj.bridge.fake.motors_and_sensors import Wheel
 from epuck_mj.constants import SPEED_MAX, WHEEL_RADIUS
@@ -37,6 +39,7 @@ from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.motors import STEP_ANGLE
 from epuck_mj.trials.trajectory import Trajectory
+from tests.fleets import befall
 from tests.no_pictures import BRIDGE, show_nothing
 from tests.processes import PATIENCE, python_process
 from tests.test_fake import fake_process, living, wait_for
@@ -131,6 +134,23 @@ def run(
         if disturbed or chance == 1 or not re.search(BUSY, done.stderr):
             return done
     raise AssertionError("unreachable")
+
+
+@pytest.fixture
+def fault_on_the_way(at_each_line):
+    """Lets something happen to a robot that drives: at its third line."""
+
+    def set_up(emulator: Emulator, fault: str) -> None:
+        lines = itertools.count(1)
+
+        def line():
+            if next(lines) == 3:
+                assert not emulator.body.standing
+                befall(emulator, fault)
+
+        at_each_line(line)
+
+    return set_up
 
 
 @pytest.fixture
@@ -287,14 +307,15 @@ def test_over_wifi(kinematic, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("fault", ["stall@3", "disconnect@3+0.5", "gone@3"])
-def test_faults_over_wifi(kinematic, tmp_path, fault):
+@pytest.mark.parametrize("fault", ["stall@{}", "disconnect@{}+0.5", "gone@{}"])
+def test_faults_over_wifi(kinematic, tmp_path, fault, fault_on_the_way):
     endpoint = Tcp(0)
-    with living(endpoint, kinematic, AT_WALL, "wifi", fault) as emulator:
+    with living(endpoint, kinematic, AT_WALL, "wifi") as emulator:
+        fault_on_the_way(emulator, fault)
         name = endpoint.name.replace("socket:", "tcp:")
         done = run(name, tmp_path / "log", disturbed=True)
-        assert emulator.body.standing == (fault != "gone@3")
-    assert done.returncode == (4 if fault == "gone@3" else 3), done.stderr
+        assert emulator.body.standing == (fault != "gone@{}")
+    assert done.returncode == (4 if fault == "gone@{}" else 3), done.stderr
     assert done.stderr.count("\n") == 1
     assert "e-puck2 over WiFi, selector at 3" in done.stdout
     trajectory = Trajectory.load(tmp_path / "log.npz")
@@ -394,36 +415,54 @@ def test_a_reader_that_went_away(kinematic, port, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("faults", "status", "cause"),
+    ("fault", "status", "cause"),
     [
-        ("stall@3", 3, "the robot did not answer for 0.3 s, so it was stopped"),
-        ("reset@3", 3, "the robot "),
-        ("disconnect@3+0.5", 3, "the connection to the robot was lost, so it was sto"),
+        ("stall@{}", 3, "the robot did not answer for 0.3 s, so it was stopped"),
+        ("reset@{}", 3, "the robot "),
+        ("disconnect@{}+0.5", 3, "the connection to the robot was lost, so it was sto"),
         (
-            "gone@3",
+            "gone@{}",
             4,
             "THE MOTORS MAY STILL TURN, switch the robot off: the robot did not "
             "confirm that it stopped; before that, the connection to the robot was l",
         ),
-        ("loss@3+100", 3, "the robot did not answer for 0.3 s, so it was stopped"),
-        ("noise@0.8,noise@1,noise@1.2,noise@1.4,noise@1.6,noise@1.8", None, ""),
-        ("garbage@1,garbage@1.5", None, ""),
+        ("loss@{}+100", 3, "the robot did not answer for 0.3 s, so it was stopped"),
     ],
 )
-def test_faults(kinematic, port, tmp_path, faults, status, cause):
-    arguments = ("--seconds", "2") if status is None else ()
-    with living(port, kinematic, AT_WALL, faults=faults) as emulator:
-        done = run(port.name, tmp_path / "log", *arguments, disturbed=True)
+def test_faults(kinematic, port, tmp_path, fault, status, cause, fault_on_the_way):
+    with living(port, kinematic, AT_WALL) as emulator:
+        fault_on_the_way(emulator, fault)
+        done = run(port.name, tmp_path / "log", disturbed=True)
         assert emulator.body.standing == (status != 4)
-    assert done.returncode in ((0, 3) if status is None else (status,))
+    assert done.returncode == status
+    _assert_told(done, tmp_path / "log.npz", cause)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "faults",
+    [
+        "noise@0.8,noise@1,noise@1.2,noise@1.4,noise@1.6,noise@1.8",
+        "garbage@1,garbage@1.5",
+    ],
+)
+def test_faults_that_a_drive_may_survive(kinematic, port, tmp_path, faults):
+    with living(port, kinematic, AT_WALL, faults=faults) as emulator:
+        done = run(port.name, tmp_path / "log", "--seconds", "2", disturbed=True)
+        assert emulator.body.standing
+    assert done.returncode in (0, 3)
+    _assert_told(done, tmp_path / "log.npz")
+
+
+def _assert_told(done: Done, log: Path, cause: str = "") -> None:
+    """A drive that failed says why in a line, and keeps what was seen until then."""
     if done.returncode:
         assert done.stderr.startswith("error: ")
         assert done.stderr.count("\n") == 1
         assert cause in done.stderr
         # details are for those who ask for them
         assert "expected" not in done.stderr
-    # what was seen until then
-    assert Trajectory.load(tmp_path / "log.npz").steps > 0
+    assert Trajectory.load(log).steps > 0
     assert "control steps" in done.stdout
 
 

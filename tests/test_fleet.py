@@ -21,7 +21,6 @@ import pytest
 from epuck_mj.bridge.__main__ import bridge
 from epuck_mj.bridge.drive.order import Order
 from epuck_mj.bridge.fake.emulator import Emulator
-from epuck_mj.bridge.fake.scenarios import scenario
 from epuck_mj.bridge.fleet import crew, fleet_drive, screen
 from epuck_mj.bridge.fleet.driver import MODULE
 from epuck_mj.bridge.fleet.members import Member, members_at, read_fleet
@@ -30,7 +29,7 @@ from epuck_mj.errors import UserError
 from epuck_mj.host.output import Output
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.trials.trajectory import Trajectory
-from tests.fleets import Terminal, all_move, robots, slowest_stop
+from tests.fleets import Terminal, all_move, befall, robots, slowest_stop
 from tests.no_pictures import BRIDGE, show_nothing
 from tests.processes import PATIENCE, python_process
 from tests.test_fake import wait_for
@@ -74,13 +73,6 @@ def on_a_terminal(arguments: list[str]):
             yield process, terminal
     finally:
         terminal.close()
-
-
-def befall(emulator: Emulator, fault: str) -> None:
-    """Let it happen now, however long the robot had to wait until it drove."""
-    assert emulator._begun is not None
-    now = time.monotonic() - emulator._begun
-    emulator._faults = scenario(fault.format(f"{now:.3f}"))
 
 
 def ever_drove(emulator: Emulator) -> bool:
