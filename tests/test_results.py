@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from epuck_mj.errors import UserError
@@ -160,18 +161,19 @@ def test_the_gap_s_documents_say_what_was_measured(folder, monkeypatch):
     kinds = next(iter(record["robots"].values()))
     names = list(next(iter(kinds.values())))
     policies = named_again(names)
+    outcomes = pd.read_parquet(RESULTS / folder / "gap.parquet")
+    measures = ("reference", "fitness", "collisions_per_minute", "crash_rate")
     gaps = []
     for kind, worlds in record["worlds"].items():
         transfers = {}
         for robot, kinds in record["robots"].items():
-            each = kinds[kind].values()
-            nominal = np.array([policy["nominal"] for policy in each])
-            ideal = np.array([policy["ideal"] for policy in each]).T
-            there = [
-                np.array([p["in_worlds"][what] for p in each]).T
-                for what in ("fitness", "collisions_per_minute", "crash_rate")
-            ]
-            transfers[robot] = Transfer(nominal, np.maximum(nominal, ideal), *there)
+            nominal = np.array([policy["nominal"] for policy in kinds[kind].values()])
+            own = outcomes[outcomes.robot.eq(robot) & outcomes.kind.eq(kind)]
+            there = (
+                own.pivot(index="number", columns="policy", values=measure)[names]
+                for measure in measures
+            )
+            transfers[robot] = Transfer(nominal, *(each.to_numpy() for each in there))
         gap = Gap(
             kind,
             names,

@@ -3,7 +3,7 @@
 import json
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -29,10 +29,6 @@ Places = Mapping[str, Sequence[World]]
 Measured = dict[str, tuple[list[Outcome], list[list[Outcome]], list[list[Outcome]]]]
 """For each kind of worlds, outcomes in nominal conditions, on ideal robots in each
 world's arena, and in each world."""
-
-
-MEASURES = tuple(field.name for field in fields(Outcome))
-"""What is measured of a policy in a world."""
 
 
 def write_gap(
@@ -118,34 +114,8 @@ def _write(
         )
         for kind, own in places.items()
     ]
-    record = {
-        "starts": starts,
-        "worlds": {
-            kind: [asdict(world) for world in own] for kind, own in places.items()
-        },
-        "robots": {
-            robot: {
-                gap.kind: {
-                    policy.name: {
-                        **asdict(verdict(gap.transfers[robot], i)),
-                        "ideal": [world[i].fitness for world in outcomes[gap.kind][1]],
-                        "in_worlds": {
-                            measure: [
-                                getattr(world[i], measure)
-                                for world in outcomes[gap.kind][2]
-                            ]
-                            for measure in MEASURES
-                        },
-                    }
-                    for i, policy in enumerate(policies)
-                }
-                for gap in gaps
-            }
-            for robot, outcomes in measured.items()
-        },
-    }
     with writing():
-        write_text(folder / "gap.json", json.dumps(record) + "\n")
+        write_text(folder / "gap.json", json.dumps(_record(places, gaps)) + "\n")
         write_rows(folder / "gap.parquet", _rows(places, gaps))
         write_text(folder / "gap.md", to_markdown(gap_document(gaps)))
         write_text(folder / "summary.md", to_markdown([gap_summary(gaps)]))
@@ -153,19 +123,40 @@ def _write(
     write_figure(gap_figure(gaps, names), folder, "gap")
 
 
+def _record(places: Places, gaps: Sequence[Gap]) -> dict[str, Any]:
+    """What gap.json holds: the worlds, and a summary of each policy in each kind."""
+    first = gaps[0]
+    return {
+        "starts": first.starts,
+        "worlds": {
+            kind: [asdict(world) for world in own] for kind, own in places.items()
+        },
+        "robots": {
+            robot: {
+                gap.kind: {
+                    name: asdict(verdict(gap.transfers[robot], i))
+                    for i, name in enumerate(gap.names)
+                }
+                for gap in gaps
+            }
+            for robot in first.transfers
+        },
+    }
+
+
 def _rows(places: Places, gaps: Sequence[Gap]) -> list[dict[str, Any]]:
     """Rows of gap.parquet, one per kind of worlds, robot, policy and world.
 
-    What a world is like is in gap.json. Four decimals are enough for plots, and small.
+    What a world is like is in gap.json.
     """
     return [
         {
             "robot": robot,
             "policy": name,
-            "fitness": round(float(transfer.fitness[j, i]), 4),
-            "crash_rate": round(float(transfer.crash_rate[j, i]), 4),
-            "share": round(float(transfer.share[j, i]), 4),
-            "collisions_per_minute": round(float(transfer.collisions[j, i]), 4),
+            "fitness": float(transfer.fitness[j, i]),
+            "reference": float(transfer.reference[j, i]),
+            "crash_rate": float(transfer.crash_rate[j, i]),
+            "collisions_per_minute": float(transfer.collisions[j, i]),
             "kind": world.kind,
             "number": world.number,
             "arena": world.arena,

@@ -77,9 +77,10 @@ def publish(argv: Sequence[str]) -> int:
         studies = [str(path) for path in varied]
         report_variations([*studies, "--output", "results/report-variations"])
     # git keeps the pages that it shows, with their pictures
-    for file in Path("results").glob("report-*/**/*"):
-        if file.suffix in (".svg", ".pdf", ".html"):
-            file.unlink()
+    for pattern in ("report-*/**/*", "gap*/*"):
+        for file in Path("results").glob(pattern):
+            if file.suffix in (".svg", ".pdf", ".html"):
+                file.unlink()
     for page, text in pages_with_tables(Path()).items():
         files.write_text(page, text)
     return 0

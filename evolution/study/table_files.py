@@ -47,7 +47,7 @@ def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     write_table(path, pa.Table.from_pylist([*rows]))
 
 
-REPEATING = ("crash_rate",)
+REPEATING = ("crash_rate", "reference")
 """Columns of floats of which there are few."""
 
 LISTS = ("genome", "best_stored_genome")
