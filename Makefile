@@ -75,14 +75,14 @@ ppo: $(INSTALLED)
 	$(BIN)/python -m benchmarks.ppo.figure
 
 # champions in other worlds, kinematic and on wheels; fast ones are also driven slower.
-# An hour on two cores. Then only worlds in which the gains of the sensors are known
+# An hour on two cores. Then those in which the gains of the sensors are known to 10 %
 gap: $(INSTALLED)
 	$(BIN)/python -m evolution.gap \
 	  $(foreach seed,1 2 3,$(PAPERS:%=results/paper/%/seed-$(seed))) \
 	  results/transfer $(FOR_ROBOTS) --starts 10 --speeds 0.04 0.08 \
 	  --kinds usual beyond corners --output results/gap
 	$(BIN)/python -m evolution.gap $(FOR_ROBOTS) --starts 20 --speeds 0.08 \
-	  --kinds calibrated --output results/gap-calibrated
+	  --kinds calibrated-gains --output results/gap-calibrated
 
 # what git keeps of the studies in runs/, and everything that is made of it
 results: $(INSTALLED)

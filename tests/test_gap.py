@@ -117,15 +117,18 @@ def test_ranges_half_as_wide_again_are_those_of_robots_that_can_be():
 
 
 def test_calibrated_gains_differ_from_the_published_ones_by_about_a_tenth():
-    places = worlds(100, "calibrated")
+    places = worlds(100, "calibrated-gains")
     factors = np.log([met(world, 2, 1).gains[0] for world in places])
     common = factors.mean(axis=1)
     # eight sensors' own gains do not cancel each other
     assert np.log(1.1) / 2 < np.abs(common).max() < 2 * np.log(1.1)
     assert np.log(1.1) / 4 < np.std(factors - common[:, None]) < np.log(1.1)
+    for world in places:
+        assert abs(np.log(world.curve * world.light)) <= np.log(1.1)
+        assert world.gain_spread <= np.log(1.1)
     same = set(WORLD_RANGES) - {"curve", "light", "gain_spread"}
     for name in same:
-        assert KINDS["calibrated"].ranges[name] == WORLD_RANGES[name], name
+        assert KINDS["calibrated-gains"].ranges[name] == WORLD_RANGES[name], name
 
 
 def test_starts_differ_from_world_to_world(monkeypatch):
@@ -420,7 +423,23 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
     arguments = ["wall-follower", str(CHAMPION), "--output", str(output)]
     small = ["--worlds", "3", "--starts", "2", "--robot", "epuck_kinematic"]
     small += ["--speeds", "0.04"]
-    assert measure_gap([*arguments, *small]) == 0
+    seen: dict[tuple[str, int], list[Outcome]] = {}
+    seen_ideal: dict[str | None, list[Outcome]] = {}
+
+    def watched(policies, places, *others):
+        each = zip(places, in_worlds(policies, places, *others), strict=True)
+        for place, found in each:
+            seen[place.kind, place.number] = found
+            yield found
+
+    def watched_ideal(policies, robot, n, threads, arena=None):
+        seen_ideal[arena] = ideal(policies, robot, n, threads, arena)
+        return seen_ideal[arena]
+
+    with monkeypatch.context() as patch:
+        patch.setattr("evolution.gap.gap_folder.in_worlds", watched)
+        patch.setattr("evolution.gap.gap_folder.ideal", watched_ideal)
+        assert measure_gap([*arguments, *small]) == 0
     names = {path.name for path in output.iterdir()}
     pictures = {"gap.png", "gap.svg", "gap.pdf"}
     assert names == {"gap.md", "summary.md", "gap.json", "gap.parquet", *pictures}
@@ -436,12 +455,20 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
     assert len(rows) == 4 * 3 * len(KINDS)
     for row in rows:
         kind, world = row["kind"], row["number"]
-        assert row["reference"] >= kinds_of[kind][row["policy"]]["nominal"]
+        i = list(kinds_of[kind]).index(row["policy"])
+        there = seen[kind, world][i]
+        assert row["fitness"] == there.fitness
+        assert row["crash_rate"] == there.crash_rate
+        assert row["collisions_per_minute"] == there.collisions_per_minute
+        # `ideal` is asked for where all evolved, and then for each arena
+        home, own = seen_ideal[None][i], seen_ideal[row["arena"]][i]
+        assert row["reference"] == max(home.fitness, own.fitness)
         assert row["arena"] == record["worlds"][kind][world]["arena"]
     frame = pd.DataFrame(rows)
     frame["share"] = frame.fitness / frame.reference
-    for (kind, policy), own in frame.groupby(["kind", "policy"]):
-        told = kinds_of[kind][policy]
+    for group, own in frame.groupby(["kind", "policy"]):
+        assert isinstance(group, tuple)
+        told = kinds_of[group[0]][group[1]]
         for column in ("fitness", "crash_rate", "share"):
             assert told[column]["value"] == pytest.approx(own[column].mean())
         assert told["collisions"]["value"] == pytest.approx(
@@ -451,10 +478,10 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
     first = (output / "gap.json").read_bytes()
     monkeypatch.setattr("evolution.gap.gap_folder.write_figure", lambda *_: None)
     some = tmp_path / "some"
-    kinds = ["--kinds", "calibrated", "corners", "calibrated"]
+    kinds = ["--kinds", "calibrated-gains", "corners", "calibrated-gains"]
     assert measure_gap([*arguments[:3], str(some), *small, *kinds]) == 0
     fewer = json.loads((some / "gap.json").read_text())["robots"]["epuck_kinematic"]
-    assert fewer == {kind: kinds_of[kind] for kind in ("calibrated", "corners")}
+    assert fewer == {kind: kinds_of[kind] for kind in ("calibrated-gains", "corners")}
     page = (some / "gap.md").read_text()
     assert "Worlds with calibrated gains have" in page
     assert "sual worlds" not in page
@@ -479,7 +506,7 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
         (["wall-follower", "--threads", "-1"], "threads"),
         (
             ["wall-follower", "--kinds", "usual", "odd"],
-            "no kind of worlds 'odd'; available: usual, beyond, corners, calibrated",
+            "no kind of worlds 'odd'; available: usual, .*, calibrated-gains",
         ),
         (["wall-follower", "--speeds", "0.04", "-1"], "--speeds.*, got -1"),
         (["wall-follower", "--speeds", "3"], "--speeds.*got 3"),

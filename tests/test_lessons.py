@@ -193,8 +193,8 @@ def test_runs_resume_and_are_independent_of_threads(name, monkeypatch):
     assert resumed.history() == whole.history()
     for key, array in whole.state().items():
         np.testing.assert_array_equal(resumed.state()[key], array, err_msg=key)
-    # less than a generation is left
-    assert config.evaluations - 214 < whole.evaluations <= config.evaluations
+    left = config.evaluations - whole.evaluations
+    assert 0 <= left < whole.optimizer.next_cost()
 
 
 def test_lessons_on_wheels_after_the_climb():

@@ -158,8 +158,8 @@ def test_what_is_shipped_is_small():
 def test_the_gap_s_documents_say_what_was_measured(folder, monkeypatch):
     monkeypatch.chdir(ROOT)
     record = json.loads((RESULTS / folder / "gap.json").read_text())
-    kinds = next(iter(record["robots"].values()))
-    names = list(next(iter(kinds.values())))
+    first_robot = next(iter(record["robots"].values()))
+    names = list(next(iter(first_robot.values())))
     policies = named_again(names)
     outcomes = pd.read_parquet(RESULTS / folder / "gap.parquet")
     measures = ("reference", "fitness", "collisions_per_minute", "crash_rate")

@@ -375,7 +375,8 @@ def test_addresses_name_runs_wherever_they_are(study, unpacked):
     )
     assert len(runs_at(study.path)) == len(names) + 1
     assert isinstance(run_at(study.run("ga", 7).path), RunDirectory)
-    for nothing in ("ga/seed-3", "ga/seed-01", "nope/seed-1", "ga"):
+    huge = f"ga/seed-{'9' * 20}"
+    for nothing in (huge, "ga/seed-3", "ga/seed-01", "nope/seed-1", "ga"):
         assert runs_at(study.path / nothing) == []
         with pytest.raises(UserError, match="STUDY/EXPERIMENT/seed-N"):
             named_policies(str(study.path / nothing))

@@ -21,6 +21,7 @@ EXAMPLES = (
     "python -m evolution.gap results/paper --output gap",
     "python -m evolution.gap runs/a runs/b --output gap --worlds 20",
     "python -m evolution.gap results/paper wall-follower --output gap --speeds 0.04",
+    "python -m evolution.gap runs/a --output gap --kinds calibrated-gains",
 )
 
 
@@ -31,8 +32,8 @@ class GapOptions:
     Attributes:
         paths: run or study directories, controller files, or wall-follower.
         output: folder for gap.md, summary.md, gap.json, gap.parquet and figures.
-        kinds: kinds of worlds: usual, beyond, corners, calibrated; all if not given.
-            The first given is the one of shares, latencies and ranks.
+        kinds: kinds of worlds: usual, beyond, corners, calibrated-gains; all if not
+            given. Shares kept, latencies and ranks are those of the first kind given.
         worlds: number of worlds of each kind.
         starts: number of test starts in each world and in the arena of evolution.
         robot: robot that drives; if not given, the one that all evolved on, kinematic

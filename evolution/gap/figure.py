@@ -19,7 +19,7 @@ MARKS = {
     "usual": ("o", colors.BLUE),
     "beyond": ("s", colors.VERMILION),
     "corners": ("^", colors.GREEN),
-    "calibrated": ("D", colors.PURPLE),
+    "calibrated-gains": ("D", colors.PURPLE),
 }
 """Marker and colour of each kind of worlds."""
 

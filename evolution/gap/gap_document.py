@@ -108,7 +108,7 @@ def gap_document(gaps: Sequence[Gap]) -> list[Block]:
             "the share of the trials that end in a crash. The nominal fitness is "
             "that with ideal sensors and motors, in the arena that a policy evolved "
             "in, from as many test starts. Kept is the fitness in the first column's "
-            "worlds as a share of the nominal fitness."
+            "worlds as a share of a reference, see below."
         ),
         gap_summary(gaps),
         Paragraph(

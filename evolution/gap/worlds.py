@@ -143,7 +143,7 @@ class Kind:
 
     Attributes:
         title: for readers.
-        about: a sentence for readers: what sets them apart.
+        about: sentences for readers: what sets them apart.
         ranges: of their quantities.
         arenas: that they are in, as often each.
     """
@@ -155,7 +155,11 @@ class Kind:
 
 
 CALIBRATED_GAIN = 1.1
-"""What a calibration leaves of gains, as a factor: of all sensors, and of each."""
+"""Largest factor by which the common gain is off after a calibration.
+
+Its logarithm is the largest spread of the sensors' own gains. Source: gains that are
+fitted to a log are right to 10 %, measured ones to 4 % (docs/calibration.md).
+"""
 
 CALIBRATED_RANGES: Mapping[str, tuple[float, float]] = {
     **WORLD_RANGES,
@@ -176,7 +180,8 @@ KINDS: Mapping[str, Kind] = {
     ),
     "beyond": Kind(
         "ranges half as wide again",
-        "In worlds with ranges half as wide again, every range is wider that can be.",
+        "In worlds with ranges half as wide again, every range that can be wider is "
+        "wider by half.",
         half_as_wide_again(WORLD_RANGES),
         ARENAS,
     ),
@@ -187,16 +192,19 @@ KINDS: Mapping[str, Kind] = {
         WORLD_RANGES,
         CORNERS,
     ),
-    "calibrated": Kind(
+    "calibrated-gains": Kind(
         "gains calibrated to 10 %",
-        "Worlds with calibrated gains have the usual ranges but for the sensors: the "
-        "gain of all of them, light included, is right to 10 %, and the gain of each "
-        "has a standard deviation of up to 10 % more.",
+        "Worlds with calibrated gains have the usual ranges but for the sensors' "
+        "gains: the gain that all share, light included, is right to 10 %, and each "
+        "sensor's own gain differs from it with a standard deviation of at most 10 %.",
         CALIBRATED_RANGES,
         ARENAS,
     ),
 }
-"""Kinds of worlds by name; the first are those of the headline."""
+"""Kinds of worlds by name.
+
+New ones go to the end: a kind's place is the seed of its worlds.
+"""
 
 
 def worlds(n: int, kind: str = "usual") -> list[World]:

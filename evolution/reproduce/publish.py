@@ -37,7 +37,7 @@ OTHERS = (TRANSFER, REAL_ROBOTS, HYBRIDS, GOOD_ROBOT, CLIMBING)
 """All that are not reported."""
 
 GAPS = ("gap", "gap-calibrated")
-"""Folders of the reality gap: in all worlds, and with calibrated gains."""
+"""Folders of the reality gap: in three kinds of worlds, and with calibrated gains."""
 
 PAGES: Mapping[str, tuple[str, ...]] = {
     "README.md": ("medians",),

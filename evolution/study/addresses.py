@@ -28,7 +28,7 @@ def runs_at(place: Path, histories: bool = False) -> list[PlacedRun]:
         histories: whether those in tables are read with their histories.
 
     Raises:
-        UserError: if it is in tables that are damaged.
+        UserError: if the tables, or the rows that are asked for, are damaged.
     """
     if files.is_directory(place):
         run = RunDirectory(place)

@@ -48,7 +48,7 @@ def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 REPEATING = ("crash_rate", "reference")
-"""Columns of floats of which there are few."""
+"""Columns of floats with few distinct values."""
 
 LISTS = ("genome", "best_stored_genome")
 """Columns of lists without equal values."""

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
@@ -69,7 +68,7 @@ class Tables:
             return []
         try:
             return rows_of(_of_run(read_table(self.champions), only))
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, KeyError) as error:
             raise UserError(f"'{self.champions}' is damaged: {error}") from None
 
     def histories(self) -> dict[RunKey, History]:
@@ -208,8 +207,8 @@ def _of_run(champions: pa.Table, run: RunKey | None) -> pa.Table:
     """The rows of a run; all if none is given."""
     if run is None:
         return champions
-    name, seed = (pc.field(key) == value for key, value in zip(KEYS, run, strict=True))
-    return champions.filter(name & seed)
+    keys = zip(*(champions[key].to_pylist() for key in KEYS), strict=True)
+    return champions.filter(pa.array([key == run for key in keys], pa.bool_()))
 
 
 KEYS = ("experiment", "seed")
