@@ -14,7 +14,6 @@ from epuck_mj.host.files import check_writable, writing
 from epuck_mj.host.limits import check_flag
 from epuck_mj.scene.model_files import without_physics
 from evolution.gap.slowed import with_slowed
-from evolution.gap.worlds import KINDS
 from evolution.named_policies import common_wheels, policies_of
 
 EXAMPLES = (
@@ -55,17 +54,12 @@ class GapOptions:
 def measure_gap(argv: Sequence[str]) -> int:
     """Run the command line and return its exit status."""
     options = parse(GapOptions, "python -m evolution.gap", argv, examples=EXAMPLES)
-    unknown = [kind for kind in options.kinds if kind not in KINDS]
-    if unknown:
-        raise UserError(
-            f"no kind of worlds '{unknown[0]}'; available: {', '.join(KINDS)}"
-        )
-    kinds = tuple(dict.fromkeys(options.kinds)) or tuple(KINDS)
     check_flag("worlds", options.worlds)
     check_flag("starts", options.starts, "worlds")
     for speed in options.speeds:
         check_flag("speeds", speed, "v_max")
     check_threads(options.threads)
+    kinds = _kinds(options.kinds)
     policies = with_slowed(policies_of(dict.fromkeys(options.paths)), options.speeds)
     wheels = common_wheels(policies)
     kinematic = without_physics(wheels)
@@ -97,6 +91,22 @@ def measure_gap(argv: Sequence[str]) -> int:
     )
     print((options.output / "gap.md").read_text(encoding="utf-8"), end="")
     return 0
+
+
+def _kinds(asked: Sequence[str]) -> tuple[str, ...]:
+    """The kinds of worlds that are asked for, each once; all if none is.
+
+    Raises:
+        UserError: if there is no such kind.
+    """
+    # slow to import
+    from evolution.gap.worlds import KINDS
+
+    for kind in asked:
+        if kind not in KINDS:
+            available = ", ".join(KINDS)
+            raise UserError(f"no kind of worlds '{kind}'; available: {available}")
+    return tuple(dict.fromkeys(asked)) or tuple(KINDS)
 
 
 if __name__ == "__main__":

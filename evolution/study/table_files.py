@@ -76,3 +76,17 @@ def read_table(path: Path, names: Collection[str] = (), some: bool = False) -> p
     except Exception as error:
         reason = " ".join(str(error).split())
         raise UserError(f"cannot read '{path}': {reason}") from None
+
+
+def with_values(
+    table: pa.Table, names: Sequence[str], values: Sequence[Any]
+) -> pa.Table:
+    """The rows of a table that have these values in these columns.
+
+    Raises:
+        KeyError: if it lacks a column.
+    """
+    columns = zip(*(table[name].to_pylist() for name in names), strict=True)
+    return table.filter(
+        pa.array([each == tuple(values) for each in columns], pa.bool_())
+    )

@@ -7,8 +7,6 @@ A run is in the tables if champions.parquet, which is written last, has its row.
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import pyarrow as pa
-
 from epuck_mj.errors import UserError
 from epuck_mj.host import files
 from epuck_mj.host.csv_text import csv_columns, csv_text
@@ -31,7 +29,7 @@ from evolution.study.provenances import (
     together,
     write_provenances,
 )
-from evolution.study.table_files import read_table, write_table
+from evolution.study.table_files import read_table, with_values, write_table
 from evolution.study.thinning import thinned
 
 
@@ -67,7 +65,8 @@ class Tables:
         if not files.is_file(self.champions):
             return []
         try:
-            return rows_of(_of_run(read_table(self.champions), only))
+            table = read_table(self.champions)
+            return rows_of(table if only is None else with_values(table, KEYS, only))
         except (ValueError, TypeError, KeyError) as error:
             raise UserError(f"'{self.champions}' is damaged: {error}") from None
 
@@ -201,14 +200,6 @@ class Tables:
             }
         except ValueError as error:
             raise UserError(f"'{self.timing}' is damaged: {error}") from None
-
-
-def _of_run(champions: pa.Table, run: RunKey | None) -> pa.Table:
-    """The rows of a run; all if none is given."""
-    if run is None:
-        return champions
-    keys = zip(*(champions[key].to_pylist() for key in KEYS), strict=True)
-    return champions.filter(pa.array([key == run for key in keys], pa.bool_()))
 
 
 KEYS = ("experiment", "seed")
