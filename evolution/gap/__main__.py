@@ -43,7 +43,7 @@ class GapOptions:
 
     paths: tyro.conf.Positional[Annotated[tuple[str, ...], word("RUN")]]
     output: Annotated[Path, word("FOLDER")]
-    kinds: tuple[str, ...] = ()
+    kinds: Annotated[tuple[str, ...], word("KIND")] = ()
     worlds: int = 100
     starts: int = 20
     robot: Annotated[str | None, word("ROBOT")] = None
