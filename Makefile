@@ -75,7 +75,7 @@ ppo: $(INSTALLED)
 	$(BIN)/python -m benchmarks.ppo.figure
 
 # champions in other worlds, kinematic and on wheels; fast ones are also driven slower.
-# An hour on two cores. Then those in which the gains of the sensors are known to 10 %
+# About 40 minutes on two cores. Then those in which the gains of the sensors are known to 10 %
 gap: $(INSTALLED)
 	$(BIN)/python -m evolution.gap \
 	  $(foreach seed,1 2 3,$(PAPERS:%=results/paper/%/seed-$(seed))) \

@@ -108,7 +108,7 @@ def gap_document(gaps: Sequence[Gap]) -> list[Block]:
             "the share of the trials that end in a crash. The nominal fitness is "
             "that with ideal sensors and motors, in the arena that a policy evolved "
             "in, from as many test starts. Kept is the fitness in the first column's "
-            "worlds as a share of a reference, see below."
+            "worlds as a share of a reference (see What is kept)."
         ),
         gap_summary(gaps),
         Paragraph(
@@ -117,16 +117,16 @@ def gap_document(gaps: Sequence[Gap]) -> list[Block]:
         ),
         Heading("Latency"),
         Paragraph(
-            "Fitness and crashes where commands reach the wheels this many control "
-            f"steps late ({title})."
+            f"Worlds: {title}. Fitness and crashes by how many control steps late "
+            "commands reach the wheels."
         ),
         by_latency(first),
         Heading("What is kept"),
         Paragraph(
-            f"Kept ({title}) is the fitness in the world as a share of a reference: "
-            "the nominal fitness, or the fitness of an ideal robot in the world's "
-            "arena if that is higher (in a smaller arena, robots find walls sooner). A "
-            "slow policy has little to lose. A policy masters a world if it "
+            f"Worlds: {title}. Kept is the fitness in the world as a share of a "
+            "reference: the nominal fitness, or the fitness of an ideal robot in the "
+            "world's arena if that is higher (in a smaller arena, robots find walls "
+            "sooner). A slow policy has little to lose. A policy masters a world if it "
             f"keeps at least {SHARE_KEPT:.0%} and has fewer than {COLLISIONS_MAX:g} "
             "collision per minute. Against nominal: worlds mastered if the reference "
             "is always the nominal fitness."
