@@ -485,7 +485,7 @@ def test_the_command_writes_what_it_measured(tmp_path, capsys, monkeypatch):
     page = (some / "gap.md").read_text()
     assert "Worlds with calibrated gains have" in page
     assert "sual worlds" not in page
-    assert "(gains calibrated to 10 %)" in page
+    assert "Worlds: gains calibrated to 10 %. " in page
     assert measure_gap([*arguments, *small]) == 0
     assert (output / "gap.json").read_bytes() == first
 
