@@ -1,7 +1,10 @@
 # make run: evolve a wall follower; make test: all that CI checks.
 PYTHON ?= python3
 BIN := .venv/bin
+PROGRAM := .venv/.program
 INSTALLED := .venv/.installed
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check \
+  --constraint constraints.txt --editable
 RUN := runs/de-best-seed-1
 LESSON := runs/lesson
 # without the notice of mkdocs-material
@@ -15,7 +18,7 @@ FOR_ROBOTS := $(ROBUST:%=results/real-robots/robust/seed-%) \
 
 .PHONY: run test docs docs-serve bench ladder convergence racing overhead recording bridge fleet ppo gap results figures clean
 
-run: $(INSTALLED)
+run: $(PROGRAM)
 	@if [ -f $(RUN)/config.yaml ]; then \
 	  $(BIN)/python -m evolution.run --resume $(RUN); \
 	else \
@@ -68,7 +71,7 @@ fleet: $(INSTALLED)
 
 # PPO beside DE/best: 15 minutes; needs the extra ppo, which is not in dev
 ppo: $(INSTALLED)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[ppo]'
+	$(PIP) '.[ppo]'
 	$(BIN)/python -m benchmarks.ppo
 	$(BIN)/python -m evolution.evaluate results/ppo/champion.json \
 	  --json results/ppo/test.json
@@ -103,10 +106,14 @@ $(LESSON): | $(INSTALLED)
 	$(BIN)/python -m evolution.run de-best --climb 1 --validation-starts 50 \
 	  --test-starts 100 --output $(LESSON)
 
-$(INSTALLED): pyproject.toml constraints.txt
+# all that evolves; and with it all that developers and the extras need
+$(PROGRAM): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-	  --constraint constraints.txt --editable '.[dev]'
+	$(PIP) .
+	touch $(PROGRAM)
+
+$(INSTALLED): $(PROGRAM)
+	$(PIP) '.[dev]'
 	touch $(INSTALLED)
 
 clean:

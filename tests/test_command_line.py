@@ -58,6 +58,7 @@ def test_an_unknown_command_is_one_line(capsys, monkeypatch, handlers):
     [
         ("--popultion 20", "unknown option --popultion 20; did you mean --population?"),
         ("--strategy rand", "unknown option --strategy rand; see python -m evolution"),
+        ("ga", "expected an option, got 'ga'; see python -m evolution"),
         ("--seed abc", "--seed: expected a whole number, got 'abc'"),
         ("--control-step x", "--control-step: expected a number, got 'x'"),
         ("--hidden 0", "hidden: expected a whole number from 1 to 1,000, got 0"),

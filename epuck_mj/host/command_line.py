@@ -115,6 +115,9 @@ def _in_one_line(text: str, prog: str) -> str:
     message = _unboxed(text)
     if message.startswith("Unrecognized options"):
         unknown = message.partition(": ")[2].replace(",", "")
+        if not unknown.startswith("-"):
+            first = unknown.split()[0]
+            return f"expected an option, got '{first}'; see {prog} --help"
         meant = re.search(r"Perhaps you meant:\W+(--[\w-]+)", text)
         hint = f"did you mean {meant[1]}?" if meant else f"see {prog} --help"
         return f"unknown option {unknown}; {hint}"

@@ -1,4 +1,4 @@
-"""summary.json: everything that a study has found."""
+"""summary.json: everything that a study has found; each run is in runs.csv."""
 
 import json
 import math
@@ -10,7 +10,6 @@ import numpy as np
 from epuck_mj.trials.behaviour_classes import HUG
 from evolution.pages.words import label
 from evolution.report.measures import shown_robots
-from evolution.report.run_table import run_rows
 from evolution.report.samples import (
     best_stored_fitness,
     class_means,
@@ -30,7 +29,7 @@ from evolution.study.data import StudyData
 
 
 def summary_fields(data: StudyData, output: str, ioh: bool) -> dict[str, Any]:
-    """Everything as JSON values; null is what is not known, or not finite.
+    """What was found as JSON values; null is what is not known, or not finite.
 
     Args:
         data: the study.
@@ -52,7 +51,6 @@ def summary_fields(data: StudyData, output: str, ioh: bool) -> dict[str, Any]:
             "yardstick": {
                 robot: test.to_dict() for robot, test in data.yardstick.items()
             },
-            "runs": run_rows(data),
             "pairwise": pair_rows(data),
             "success": success_rows(data),
             "targets": target_rows(data),

@@ -69,7 +69,7 @@ def how_to_get_every_number_again_section(
                 "runs.csv: every run; runs-columns.csv: what its columns mean, and "
                 "their units. The tables of this page are made from runs.csv, "
                 "pairwise.csv, success.csv and targets.csv. summary.json has all "
-                "numbers.",
+                "numbers but those of single runs.",
                 *(["ioh/: the histories, for IOHanalyzer."] if ioh else []),
                 "Bootstrap intervals use random numbers from a fixed seed, so the same "
                 "study gives the same bytes.",
