@@ -30,6 +30,7 @@ from epuck_mj.bridge.drive.console import drive_summary, live_line
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Pty, Tcp
 from epuck_mj.bridge.fake.motors_and_sensors import Wheel
+from epuck_mj.bridge.line.connect import SOCKET_SCHEME, WIFI_SCHEME
 from epuck_mj.constants import SPEED_MAX, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import SIGNALS, Interrupted, Interruption
@@ -291,14 +292,14 @@ def test_a_dry_run(kinematic, port, tmp_path):
 
 @pytest.mark.slow
 def test_over_wifi(kinematic, tmp_path):
-    endpoint = Tcp(0)
+    endpoint = Tcp(0, WIFI_SCHEME)
     with living(endpoint, kinematic, AT_WALL, "wifi") as emulator:
-        name = endpoint.name.replace("socket:", "tcp:")
+        name = endpoint.name
         arguments = ("--seconds", "1", "--calibrate")
         done = run(name, tmp_path / "log", *arguments, how=by_itself_undrawn)
         assert emulator.body.standing
     assert (done.returncode, done.stderr) == (0, "")
-    assert "e-puck2 over WiFi, selector at 3" in done.stdout
+    assert "e-puck2 over WiFi, selector at 15" in done.stdout
     trajectory = Trajectory.load(tmp_path / "log.npz")
     assert trajectory.steps == 10
     # zeroed where it stood
@@ -309,15 +310,15 @@ def test_over_wifi(kinematic, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ["stall@{}", "disconnect@{}+0.5", "gone@{}"])
 def test_faults_over_wifi(kinematic, tmp_path, fault, fault_on_the_way):
-    endpoint = Tcp(0)
+    endpoint = Tcp(0, WIFI_SCHEME)
     with living(endpoint, kinematic, AT_WALL, "wifi") as emulator:
         fault_on_the_way(emulator, fault)
-        name = endpoint.name.replace("socket:", "tcp:")
+        name = endpoint.name
         done = run(name, tmp_path / "log", disturbed=True)
         assert emulator.body.standing == (fault != "gone@{}")
     assert done.returncode == (4 if fault == "gone@{}" else 3), done.stderr
     assert done.stderr.count("\n") == 1
-    assert "e-puck2 over WiFi, selector at 3" in done.stdout
+    assert "e-puck2 over WiFi, selector at 15" in done.stdout
     trajectory = Trajectory.load(tmp_path / "log.npz")
     assert trajectory.steps > 5
     assert np.linalg.norm(trajectory.pose[-1, :2] - AT_WALL[:2]) > 0.02
@@ -488,12 +489,11 @@ def test_a_robot_that_dies(tmp_path, at_each_line):
 @pytest.mark.parametrize("kind", ["pty", "tcp", "wifi"])
 def test_a_bridge_that_is_killed(kinematic, tmp_path, kind):
     """`kill -9` too: its guardian stops the robot, and lets go of the port."""
-    endpoint = Pty(tmp_path / "e-puck") if kind == "pty" else Tcp(0)
+    scheme = WIFI_SCHEME if kind == "wifi" else SOCKET_SCHEME
+    endpoint = Pty(tmp_path / "e-puck") if kind == "pty" else Tcp(0, scheme)
     robot = "wifi" if kind == "wifi" else "asercom"
     with living(endpoint, kinematic, robot=robot) as emulator:
         name = endpoint.name
-        if kind == "wifi":
-            name = name.replace("socket:", "tcp:")
         with started(name, tmp_path / "log") as process:
             moving(emulator)
             process.kill()

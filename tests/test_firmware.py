@@ -139,7 +139,7 @@ ANSWERS = {
     "D, E": (b"D,300,-2000\rE\r", b"d\r\ne,300,-2000\r\n"),
     "D in 16 bits": (b"D,65535,32768\rE\r", b"d\r\ne,-1,-32768\r\n"),
     "D without its end": (b"D,1,2\rD,3\rE\r", b"d\r\nd\r\ne,3,2\r\n"),
-    "S": (b"D,1,2\rS\rE\r", b"d\r\ns\r\ne,0,0\r\n"),
+    "S": (b"D,1,2\rS\rE\r", b"d\r\ns\r\ne,1,2\r\n"),
     "L": (b"L,0,1\r", b"l\r\n"),
     "C": (b"C\r", b"c,3\r\n"),
     "V": (b"V\r", b"v,Version 1.2.2 August 2008 GCtronic\r\nHW version: 1.1\r\n"),
@@ -466,7 +466,7 @@ def test_requests_that_change_something(build):
     assert cycle == Cycle(Proximity((0,) * 8), Steps(-1000, 1000))
     assert robot.hear(b"E\r") == b"e,300,301\r\n"
     assert ask(robot, ascii.stop_order()) == Acknowledged()
-    assert robot.hear(b"E\r") == b"e,0,0\r\n"
+    assert robot.hear(b"E\r") == b"e,300,301\r\n"
 
 
 @given(

@@ -256,6 +256,7 @@ def test_a_fitness_of_ones_own_is_the_reward(tmp_path):
         ({"nois": "none"}, "unknown option 'nois'; available: robot, arena, steps, "),
         ({"max_steps": 3}, "unknown option 'max_steps'; available: robot, "),
         ({"robot": "khepera"}, "khepera"),
+        ({"noise": "loud", "latency": 1}, "loud"),
         ({"robot": 3}, "robot: expected a text, got 3"),
         ({"arena": "nowhere"}, "nowhere"),
         ({"steps": 0}, "steps: expected a whole number from 1 to 10,000,000, got 0"),

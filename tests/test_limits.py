@@ -16,6 +16,7 @@ from epuck_mj.step.conditions import Conditions
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.trials.recorder import record_tracks, record_trajectories
 from evolution.run.generation_loop import Evolution
+from evolution.search.differential_evolution import DifferentialEvolutionParameters
 from evolution.settings.config import ExperimentConfig
 from evolution.settings.config_files import (
     find_config,
@@ -85,6 +86,11 @@ def small(monkeypatch):
     monkeypatch.setattr(memory, "memory", lambda: 10**9)
 
 
+MANY = DifferentialEvolutionParameters(
+    strategy="best", scale=0.8, crossover=1.0, population=100_000
+)
+
+
 def experiment(name: str, **changes) -> ExperimentConfig:
     config = load_config(find_config(name))
     optimizer = {k: v for k, v in changes.items() if hasattr(config.optimizer, k)}
@@ -123,6 +129,9 @@ def experiment(name: str, **changes) -> ExperimentConfig:
             "pairs (100,000) x weights of",
         ),
         ("cma-es", {"hidden": 1000}, "weights of the network (10,000) x itself"),
+        ("memetic-de", {"evolution": MANY}, "population (100,000) x itself (100,000)"),
+        ("policy-gradient", {"batch": 100_000}, "batch (100,000) x trials (5) x steps"),
+        ("imitators-then-cma-es", {"hidden": 1000}, "of the network (10,000) x itself"),
     ],
 )
 def test_products_count(name, changes, keys, small):

@@ -635,6 +635,27 @@ def offsets(world, build):
     return world.body.journal.sample[0]
 
 
+@pytest.mark.parametrize("build", ["asercom", "btcom", "epuck2"])
+def test_the_next_drive_begins_in_step(kinematic, build):
+    """A robot goes on reporting the speeds of the drive before, after S, too."""
+    world = World(kinematic, robot=build)
+    world.drive(5)
+    assert any(world.commands[-2])
+    again = RealRobot(
+        SerialLine(world.linked()),
+        Calibration(),
+        TASK.control_step,
+        clock=world.time.clock,
+        sleep=world.time.sleep,
+    )
+    with again:
+        again.greet()
+        for _ in Session(TASK).drive(again, WallFollower(), 5, world.time.clock):
+            pass
+    assert again.n_repairs == 0
+    assert world.body.standing
+
+
 @pytest.mark.parametrize("seed", range(N_SCENARIOS))
 def test_random_faults(kinematic, seed):
     """No hang, no wrong reading, the cause is named, and the robot stands."""

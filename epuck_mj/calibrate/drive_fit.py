@@ -156,7 +156,10 @@ def fit_drive(drive: RecordedDrive, scene: Scene, known: Calibration) -> DriveFi
             model, replace(joint, parameters=before), prior, nothing, loss=CAUCHY
         )
     except LinAlgError:
-        raise _strange(1.0, drive) from None
+        raise UserError(
+            "no robot explains this drive: --arena or --pose is wrong, or the robot is "
+            "not an e-puck"
+        ) from None
     return DriveFit(
         calibration=_checked(after.parameters, delay.latency),
         shown=shown,

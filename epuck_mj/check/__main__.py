@@ -13,6 +13,7 @@ from typing import Annotated
 import tyro
 
 from epuck_mj.host.command_line import check_ending, main, parse, word
+from epuck_mj.host.files import check_writable
 from epuck_mj.scene.model_files import KINEMATIC_ROBOT, WHEELED_ROBOT
 
 EXAMPLES = (
@@ -40,6 +41,8 @@ def check(argv: Sequence[str]) -> int:
     """Check an arena, print the findings, and return the exit status."""
     options = parse(Options, "python -m epuck_mj.check", argv, examples=EXAMPLES)
     check_ending("picture", options.picture, ".png")
+    if options.picture is not None:
+        check_writable(options.picture)
     # slow to import: after the checks of the command line
     from epuck_mj.check import report
     from epuck_mj.check.arena import check_arena

@@ -74,7 +74,7 @@ class Options:
             given = self.calibration
             if not isinstance(given, Calibration | str | Path | None):
                 raise ValueError(f"calibration: expected a path, got {shown(given)}")
-            if self.latency and NOISE[self.noise] is not None:
+            if self.latency and NOISE.get(self.noise) is not None:
                 raise ValueError(
                     f"latency: expected 0 with noise {self.noise}, got {self.latency}; "
                     "randomise gives each robot a latency of its own"

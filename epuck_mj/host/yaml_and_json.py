@@ -1,7 +1,7 @@
 """Keys and values from YAML or JSON, read strictly, with one clear line if invalid.
 
-Strictly: each key once, nothing that YAML's versions understand differently, no NaN,
-and no more than a person's files have.
+Strictly: each key once, nothing that YAML's versions understand differently, no NaN in
+JSON, and no more than a person's files have.
 """
 
 import json

@@ -21,6 +21,10 @@ def fraction(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
 
 
 def blend(low: tuple, high: tuple, share: np.ndarray) -> np.ndarray:
-    """Colours `(n, 3)` from `low` at 0 to `high` at 1, for `share` `(n,)`."""
+    """Colours `(n, 3)` from `low` at 0 to `high` at 1, for `share` `(n,)`.
+
+    A share beyond these, as a step fitness of one's own may have, gets the nearer one.
+    """
+    share = np.clip(np.nan_to_num(share), 0.0, 1.0)
     mixed = np.array(low) + share[:, None] * (np.array(high) - low)
     return np.round(mixed).astype(np.uint8)

@@ -193,8 +193,8 @@ class Disturbances:
         """Replace the disturbances of some trials, in the arrays.
 
         Args:
-            which: numbers of these trials, `(k,)`.
-            others: their new ones, `(k,)`.
+            which: numbers of these trials, `(m,)`.
+            others: their new ones, `(m,)`.
 
         Raises:
             ValueError: if trials share disturbances.

@@ -14,7 +14,7 @@ TABLE_BITS = 6
 N_TABLE = 1 << TABLE_BITS
 
 EXP_MAX = 700.0
-"""Arguments of `exp` are limited to this, which no float is far from overflowing."""
+"""Arguments of `exp` are cut to plus and minus this; e^710 would overflow."""
 
 PER_LN2 = N_TABLE * 1.4426950408889634
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10

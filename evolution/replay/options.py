@@ -15,7 +15,8 @@ class Options:
     """Watch champions drive in the rerun viewer, a browser, a video or a picture.
 
     Without --save, --web, --video and --image, the recording is written into the run
-    directory or beside the file, and the viewer opens if there is a display.
+    directory, beside the file, or else into the current folder, and the viewer opens if
+    there is a display.
 
     Attributes:
         path: run directory, controller file, wall-follower, or a recorded trajectory

@@ -69,7 +69,9 @@ def show(options: Options, replay: Replay, path: str) -> None:
         _serve(options.web)
     if not (options.save or options.image or options.video or options.web):
         place = Path(path)
-        recording = (place if place.is_dir() else place.parent) / "replay.rrd"
+        # a run of a study is a row of a table, and no folder
+        beside = place.parent if place.is_file() else Path()
+        recording = (place if place.is_dir() else beside) / "replay.rrd"
         replay.save(recording)
         _open(recording)
 

@@ -1,1 +1,1 @@
-"""Reports of studies: tables, figures, pages, and the paper's claims."""
+"""Reports of studies: their sections, tables and figures."""

@@ -4,7 +4,6 @@ Copies the tables of finished runs, writes the reports and the verdicts on the
 paper's claims, and puts the tables into the README and the pages of docs/.
 """
 
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from epuck_mj.host.command_line import main, parse
 from epuck_mj.scene.model_files import WHEELED_ROBOT
 from evolution.hybrids.__main__ import report_hybrids
 from evolution.reproduce.__main__ import reproduce_paper
+from evolution.study.config import seeds_to_yaml
 from evolution.study.directory import StudyDirectory
 from evolution.variations.__main__ import report_variations
 
@@ -106,19 +106,20 @@ def ship(source: Path, target: Path) -> None:
 
     study, copies = StudyDirectory(source), StudyDirectory(target)
     pack(study)
-    config = study.stored_config()
+    config, asked = study.stored_config(), study.asked_seeds()
+    if copies.config.is_file():
+        config = copies.stored_config().merged(config, copies.path)
+        for name, seeds in copies.asked_seeds().items():
+            asked[name] = sorted({*seeds, *asked.get(name, ())})
     runs = list(study.tables.runs(config).values())
     if not runs:
         return
     target.mkdir(parents=True, exist_ok=True)
     copies.tables.add(runs, list(config.experiments), again=True)
-    for path, copy in (
-        (study.config, copies.config),
-        (study.asked, copies.asked),
-        (study.yardstick, copies.yardstick),
-    ):
-        if path.exists():
-            shutil.copyfile(path, copy)
+    files.write_text(copies.config, config.to_yaml())
+    files.write_text(copies.asked, seeds_to_yaml(asked))
+    if study.yardstick.exists():
+        files.write_text(copies.yardstick, files.read_text(study.yardstick))
 
 
 def pages_with_tables(root: Path) -> dict[Path, str]:

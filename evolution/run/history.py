@@ -44,7 +44,8 @@ HISTORY: tuple[str, ...] = ("generation", "evaluations", "best", "mean", "std")
 """Columns of history.csv with numbers: racing changes none of them."""
 
 ROBOT, CLIMBED = "robot", "climbed"
-"""The column after these: on which robot the trials were; and what is read of it."""
+"""Last column of history.csv, the robot of the generation's trials; and what
+`read_history` makes of it: 1 where it is another robot than at first, else 0."""
 
 
 def history_text(records: Sequence[Record], robot: str) -> str:

@@ -62,7 +62,7 @@ def write_results(
         The champion's scores, as written.
     """
     config = evolution.config
-    stages = 2 + len(judges) * (1 if _met(config) is None else 2)
+    stages = 2 + len(judges) * (1 if config.noise == "none" else 2)
     stages += 2 if directory.drawn else 0
     numbers = itertools.count()
 

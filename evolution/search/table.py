@@ -10,6 +10,9 @@ two searches, imitators and lifetime learning; policy gradient is without evolut
         genomes = optimizer.ask()
         optimizer.tell(evaluate(genomes))
         spent += len(genomes)
+
+An optimiser with `needs_lessons` costs `next_cost()` and is given its lessons between
+ask and tell, as `generation_loop` does.
 """
 
 from collections.abc import Callable, Mapping

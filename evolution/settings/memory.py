@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 from epuck_mj.host.memory import TRACK_BYTES, check_memory
 from evolution.search.cma_es import CmaEsParameters
@@ -12,6 +13,9 @@ from evolution.settings.config import ExperimentConfig
 
 COPIES = 8 * 8
 """Bytes of a float of an array of which several copies are made on the way."""
+
+LESSON_BYTES = 11 * 8 * 2
+"""Bytes of a control step of a lesson: observation, two outputs and reward, twice."""
 
 
 def check_needs(config: ExperimentConfig) -> None:
@@ -30,7 +34,27 @@ def check_needs(config: ExperimentConfig) -> None:
 
 def needs(config: ExperimentConfig) -> Iterator[tuple[dict[str, int], int]]:
     """The largest arrays: numbers multiplied there, and bytes of each entry."""
-    optimizer = config.optimizer
+    steps = {"steps": config.steps}
+    trials = {"trials": config.trials}
+    yield trials | steps, TRACK_BYTES
+    yield {"test_starts": config.test_starts} | steps, TRACK_BYTES
+    for search in searches(config.optimizer):
+        yield from _needs_of_search(search, config)
+    for key in ("batch", "demonstrations"):
+        for search in searches(config.optimizer):
+            if lessons := getattr(search, key, 0):
+                yield {key: lessons} | trials | steps, LESSON_BYTES
+
+
+def searches(optimizer: Any) -> list[Any]:
+    """Parameters of the searches that a hybrid is made of; of any other itself."""
+    parts = [getattr(optimizer, name, None) for name in ("evolution", "first", "then")]
+    return [part for part in parts if part is not None] or [optimizer]
+
+
+def _needs_of_search(
+    optimizer: Any, config: ExperimentConfig
+) -> Iterator[tuple[dict[str, int], int]]:
     # a user's optimiser may have none of these fields
     keys = [each for each in ("lineages", "pairs") if hasattr(optimizer, each)]
     key = keys[0] if keys else "population"
@@ -39,12 +63,9 @@ def needs(config: ExperimentConfig) -> Iterator[tuple[dict[str, int], int]]:
         individuals = 1
     population, trials = {key: individuals}, {"trials": config.trials}
     weights = {"weights of the network": config.topology.n_genes}
-    steps = {"steps": config.steps}
     yield population | trials | weights, COPIES
-    yield trials | steps, TRACK_BYTES
-    # a tenth of the population
+    # genomes of all candidates, repeated for each start
     yield {"validation_starts": config.validation_starts} | population | weights, 8
-    yield {"test_starts": config.test_starts} | steps, TRACK_BYTES
     generations = {f"evaluations / {key}": config.evaluations // individuals}
     yield generations | weights, COPIES
     if isinstance(optimizer, DifferentialEvolutionParameters):

@@ -170,7 +170,7 @@ class Tables:
         kept = sorted(rows, key=lambda run: (rank[run[0]], run[1]))
         entries = [*read_provenances(self.provenance).values()]
         known = together([*entries, *(dict(run.provenance) for run in new)])
-        used = [rows[run]["provenance",] for run in kept]
+        used = [rows[run].get(("provenance",), "") for run in kept]
         histories = {(run.experiment, run.seed): run.history for run in new}
         parts = [history_table(histories)]
         if files.is_file(self.history):

@@ -139,6 +139,11 @@ def accomplish(
         status, word = FAILED, f"error: {told(error, mission.verbose, STOPPED)}"
     except OutputLost as error:
         status, word = OUTPUT_LOST, f"error: {error}; the robot stands still"
+    except UserError as error:
+        # of a network or a step fitness of the user's own
+        if session.start is None:
+            raise
+        status, word = FAILED, f"error: {error}; the robot was stopped"
     finally:
         try:
             trajectory = save_arrays(mission.log, session, mission.policy)

@@ -75,6 +75,7 @@ def fake(argv: Sequence[str]) -> int:
     from epuck_mj.bridge.fake.emulator import WIFI, Emulator
     from epuck_mj.bridge.fake.endpoints import Pty, Tcp, serve
     from epuck_mj.bridge.fake.simulated_body import SimulatedBody
+    from epuck_mj.bridge.line.connect import WIFI_SCHEME
     from epuck_mj.scene.model import load_scene
 
     faults = (
@@ -90,12 +91,14 @@ def fake(argv: Sequence[str]) -> int:
 
     body = SimulatedBody(scene, np.array(pose_flag(options.pose)), clock())
     robot = options.firmware if options.wifi is None else WIFI
-    tcp = options.tcp if options.wifi is None else options.wifi
     emulator = Emulator(body, robot, clock(), faults, options.latency, options.seed)
     with Output(sys.stdout) as output:
         with Interruption() as interruption, tempfile.TemporaryDirectory() as folder:
             link = options.link or Path(folder, "e-puck")
-            endpoint = Pty(link) if tcp is None else Tcp(tcp)
+            if options.wifi is not None:
+                endpoint = Tcp(options.wifi, WIFI_SCHEME)
+            else:
+                endpoint = Pty(link) if options.tcp is None else Tcp(options.tcp)
             try:
                 with interruption.raising():
                     if faults:

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from epuck_mj.bridge.fake.emulator import Emulator
+from epuck_mj.bridge.line.connect import SOCKET_SCHEME
 from epuck_mj.errors import UserError
 
 LOCALHOST = "127.0.0.1"
@@ -101,16 +102,18 @@ class Pty:
 class Tcp:
     """A TCP port on this computer, with the interface of Pty."""
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, scheme: str = SOCKET_SCHEME) -> None:
         """Appear.
 
         Args:
             port: its number; 0 takes any that is free.
+            scheme: what the bridge's name of it begins with.
 
         Raises:
             UserError: if another program has it.
         """
         self._port = port
+        self._scheme = scheme
         self._host: socket.socket | None = None
         self.is_open = False
         try:
@@ -125,7 +128,7 @@ class Tcp:
     @property
     def name(self) -> str:
         """See Pty."""
-        return f"socket://{LOCALHOST}:{self._port}"
+        return f"{self._scheme}{LOCALHOST}:{self._port}"
 
     def open(self) -> None:
         """See Pty."""

@@ -9,13 +9,15 @@ It behaves like the real ones, oddities included:
 - while it calibrates it handles no commands, and its receive ring overflows;
 - the banner comes at a reset only; a reset forgets everything;
 - speeds saturate without a message, while E reports them unsaturated; see
-  `motors_and_sensors` for the speeds of the motors.
+  `motors_and_sensors` for the speeds of the motors;
+- E reports what D commanded last, also after S.
 
 It knows C, D, E, K, L, N, O, P, Q, R, S, V, and Asercom `b`, and answers other letters
 as unknown. It opens no port and never waits: bytes and times are arguments.
 
-The source code leaves three things open. Here, E reports 0,0 after S; missing operands
-keep their last value; a full receive ring starts again and so loses its bytes.
+The source code leaves three things open. Here, E reports 0,0 before the first D;
+missing operands keep their last value; a full receive ring starts again and so loses
+its bytes.
 
 Source: gctronic/e-puck-library, `Asercom.c`, `BTcom.c`, `e_uart1_rx_char.s`;
 e-puck2/e-puck2_main-processor, `Asercom2.c`; GCtronic's wiki, "Advanced sercom
@@ -182,7 +184,7 @@ class Firmware(Talker):
                     self._say("r")
                     self._resetting = True
             case "S":
-                self._motors.drive(0, 0)
+                self._motors.stop()
                 self._light(_RING, 0)
                 self._say("s")
             case "V":

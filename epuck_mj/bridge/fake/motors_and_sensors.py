@@ -110,7 +110,11 @@ class MotorTimer:
 
 
 class Motors:
-    """Both motors and their counters."""
+    """Both motors and their counters.
+
+    Attributes:
+        commanded: speeds that `drive` was last called with [steps/s].
+    """
 
     def __init__(self, body: Body, timer: MotorTimer) -> None:
         """Motors that stand still, with counters at zero.
@@ -121,14 +125,18 @@ class Motors:
         """
         self._body = body
         self._timer = timer
-        self.commanded = (0, 0)
+        self._speeds = (0, 0)
         self.drive(0, 0)
         self.count_from(0, 0)
 
     def drive(self, left: int, right: int) -> None:
         """Turn at these speeds [steps/s], as exactly as the motors can."""
-        before, self.commanded = self.commanded, (left, right)
-        self._body.drive(*map(self._timer.wheel, self.commanded, before))
+        self.commanded = (left, right)
+        self._turn(left, right)
+
+    def stop(self) -> None:
+        """Stand still; `commanded` stays what it was."""
+        self._turn(0, 0)
 
     def count_from(self, left: int, right: int) -> None:
         """Set the counters [steps]."""
@@ -139,6 +147,10 @@ class Motors:
         """Steps since the counters were set, in 16 bits."""
         left, right = self._body.steps()
         return wrapped(left - self._origin[0]), wrapped(right - self._origin[1])
+
+    def _turn(self, left: int, right: int) -> None:
+        before, self._speeds = self._speeds, (left, right)
+        self._body.drive(*map(self._timer.wheel, self._speeds, before))
 
 
 class ProximitySensors:

@@ -144,7 +144,7 @@ class SimulatedBody:
         return np.full(N_PROXIMITY, DARK)
 
     def selector(self) -> int:
-        """See Body."""
+        """See Body: where an e-puck v1 obeys the bridge."""
         return 3
 
     def battery(self) -> float:

@@ -33,6 +33,12 @@ from epuck_mj.constants import (
 TIMER = MotorTimer(STEP_RATE_MAX, MOTOR_TICK_RATE_2, saves_current=False)
 """Motor timing with the radio's speed limit, below that of the main processor."""
 
+SELECTOR = 15
+"""Position of the rotary switch at which an e-puck2 uses WiFi.
+
+Source: GCtronic's wiki, "e-puck2 PC side development".
+"""
+
 
 class WifiFirmware(Talker):
     """An e-puck2's radio and main processor, from the moment it is switched on."""
@@ -86,5 +92,5 @@ class WifiFirmware(Talker):
         struct.pack_into("<8H", body, 37, *self._sensors.proximity())
         struct.pack_into("<8H", body, 53, *self._sensors.ambient())
         struct.pack_into("<2h", body, 79, *self._motors.counters())
-        body[89] = self._body.selector()
+        body[89] = SELECTOR
         return image + b"\x02" + body

@@ -203,7 +203,7 @@ def drive_fleet(orders: Mapping[str, Order], shows: Mapping[str, Show]) -> int:
             fleet.run(orders)
             crew.stop()
             crew.await_end(fleet.hear)
-        for name in crew.there:
+        for name in orders.keys() - fleet.ends.keys():
             fleet.ends[name] = End(RUNAWAY, NOT_ENDED, "", True)
         status = fleet.status
     # before pictures take time

@@ -42,6 +42,8 @@ class SerialLine:
             # the others toggle an LED, or do not understand
             self._link.resync(until)
             battery = "unknown to this firmware"
+        # what S leaves as it was: the speeds that every cycle is checked with
+        self.cycle(0, 0, changed=True, until=until)
         return Greeting(", ".join(version.lines), battery)
 
     def cycle(self, left: int, right: int, changed: bool, until: float) -> Cycle:

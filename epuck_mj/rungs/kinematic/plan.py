@@ -11,7 +11,7 @@ from epuck_mj.rungs.kinematic.cut import UPRIGHT, NoOutline, Outlines, add_outli
 from epuck_mj.scene.boxes import at_rest
 from epuck_mj.scene.geometry import kinematics, seen_by_rays, walls
 from epuck_mj.scene.model import Scene, once_per_model
-from epuck_mj.scene.robot_parts import ROBOT_BODY, SHELL, WHEELS, static
+from epuck_mj.scene.robot_parts import PREFIX, ROBOT_BODY, SHELL, WHEELS, static
 from epuck_mj.step.bodies import SPARE_SPEED
 
 SUBSTEP = 0.02
@@ -187,7 +187,8 @@ def _axle(scene: Scene) -> tuple[float, float, np.ndarray, np.ndarray]:
     try:
         left, right = (model.geom(name) for name in WHEELS)
     except KeyError:
-        raise _unfit(scene, "two geoms for its wheels, named as these") from None
+        names = " and ".join(name.removeprefix(PREFIX) for name in WHEELS)
+        raise _unfit(scene, f"geoms {names} as its wheels") from None
     radius = float(left.size[0])
     track = float(data.geom_xpos[left.id, 1] - data.geom_xpos[right.id, 1])
     gains = model.actuator_gainprm[scene.wheels, 0]

@@ -97,7 +97,9 @@ def growth_figure(data: StudyData, name: str) -> tuple[Figure, str]:
     if len(runs) > 1:
         axes.plot(grid, best.T, color=look.color, lw=0.4, alpha=0.35)
     lines["best so far"] = _median_and_band(axes, grid, best, look.color)
-    anew = len(runs) > 1 and getattr(data.configs[name].optimizer, "restarts", False)
+    optimizer = data.configs[name].optimizer
+    parts = (optimizer, *(getattr(optimizer, each, None) for each in ("first", "then")))
+    anew = len(runs) > 1 and any(getattr(part, "restarts", False) for part in parts)
     if not anew:
         of_mean = _median_and_band(axes, grid, curves(runs, "mean", grid), "0.45")
         of_mean.set(linestyle=(0, (4, 1)), linewidth=0.9)

@@ -51,7 +51,7 @@ def margins_figure(margins: Margins, names: Mapping[str, str], most: int) -> Fig
         names: of the experiments, for readers.
         most: the most that a trial can earn.
     """
-    experiments = margins.experiments
+    experiments = [name for name in margins.experiments if name in names]
     styles = looks(name for name in experiments if name != YARDSTICK)
     figure = Figure(figsize=(PAGE, 4.4), layout="constrained")
     grid = figure.subplots(2, len(CHANGES), sharex="col", sharey="row")
