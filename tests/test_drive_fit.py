@@ -20,7 +20,7 @@ from epuck_mj.bridge.line.link import Link
 from epuck_mj.bridge.line.serial_line import SerialLine
 from epuck_mj.calibrate.__main__ import calibrate
 from epuck_mj.calibrate.command_delay import fit_delay, lagged_rates, told_steps
-from epuck_mj.calibrate.drive_fit import ERRORS_MAX, fit_drive
+from epuck_mj.calibrate.drive_fit import ERRORS_MAX, fit_drive, without_spikes
 from epuck_mj.calibrate.drive_model import SIGHT, DriveModel, curve
 from epuck_mj.calibrate.normal_equations import Normal
 from epuck_mj.calibrate.parameters import (
@@ -233,8 +233,21 @@ def test_a_start_that_is_a_little_off(a_drive, tmp_path):
     assert fit.calibration.track == pytest.approx(own.track, rel=0.01)
 
 
-def test_wrong_missing_and_saturated_readings(tmp_path):
-    own = another_robot(4)
+def test_saturated_readings_without_a_wall_are_left_out():
+    wall = [0, 500, 4000, 4095, 4095, 4095, 4000, 500, 0]
+    spikes = [0, 20, 4095, 0, 4095, 4095, 0, 100, 4095]
+    gap = [np.nan, 4095, np.nan, 10, 10, np.nan, np.nan, 4095, np.nan]
+    counts = np.array([wall, spikes, gap], float).T
+    kept = without_spikes(counts)
+    np.testing.assert_array_equal(kept[:, 0], wall)
+    assert np.isnan(kept[:, 1]).nonzero()[0].tolist() == [2, 4, 5, 8]
+    # where nothing is known around it, it stays
+    assert np.isnan(kept[:, 2]).nonzero()[0].tolist() == [0, 1, 2, 5, 6, 8]
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_wrong_missing_and_saturated_readings(tmp_path, seed):
+    own = another_robot(seed)
     # a shorter drive is not enough
     trajectory = driven(own, 60)
     rng = np.random.default_rng(0)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.linalg import LinAlgError
 
 from epuck_mj.calibrate.command_delay import CommandDelay, fit_delay
@@ -54,6 +55,10 @@ ERRORS_MAX = np.array([0.005, 0.005, 0.01, 0.15, *[0.05] * N_PROXIMITY])
 
 Chosen: a quarter and less of the range in which robots differ (`RANGES`).
 """
+
+NEAR, REACH = 300.0, 2
+"""Counts that a wall gives at least, that many control steps before or after a reading
+that it saturates. Chosen: about half of what is published for 20 mm."""
 
 LAG_MIN = 0.05
 """Least lag that is written: none at all is no first-order lag."""
@@ -126,6 +131,7 @@ def fit_drive(drive: RecordedDrive, scene: Scene, known: Calibration) -> DriveFi
         UserError: if the drive does not fit the arena, shows nothing, or shows a robot
             that no e-puck is.
     """
+    drive = replace(drive, counts=without_spikes(drive.counts))
     delay = fit_delay(drive)
     if not delay.known:
         late = known.latency * drive.control_step
@@ -199,6 +205,20 @@ def _likeliest(model: DriveModel, known: np.ndarray) -> tuple[DriveModel, Smooth
             best = model, found
     assert best is not None
     return best
+
+
+def without_spikes(counts: np.ndarray) -> np.ndarray:
+    """Counts `(T, 8)` in which NaN stands for saturated readings that no wall gave.
+
+    A robot moves by 13 mm in a control step at most. So a sensor that is saturated at a
+    wall sees it near within `REACH` control steps, before or after, too.
+    """
+    clear = np.where(counts < SATURATED, counts, np.nan)
+    padded = np.pad(clear, ((REACH, REACH), (0, 0)), constant_values=np.nan)
+    around = sliding_window_view(padded, 2 * REACH + 1, axis=0)
+    # where all are saturated or missing, nothing is said
+    highest = np.fmax.reduce(around, axis=-1)
+    return np.where((counts >= SATURATED) & (highest <= NEAR), np.nan, counts)
 
 
 def _refuse_strange(model: DriveModel, found: Smoothed, near: np.ndarray) -> None:
