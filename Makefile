@@ -106,7 +106,7 @@ $(LESSON): | $(INSTALLED)
 	$(BIN)/python -m evolution.run de-best --climb 1 --validation-starts 50 \
 	  --test-starts 100 --output $(LESSON)
 
-# all that evolves; and with it all that developers and the extras need
+# the package with what evolution needs; then the tools of developers and the extras
 $(PROGRAM): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	$(PIP) .

@@ -27,15 +27,17 @@ from rerun.chunk import RrdReader
 from epuck_mj.bridge.__main__ import bridge
 from epuck_mj.bridge.drive import alone
 from epuck_mj.bridge.drive.console import drive_summary, live_line
+from epuck_mj.bridge.drive.mission import Mission, accomplish
 from epuck_mj.bridge.fake.emulator import Emulator
 from epuck_mj.bridge.fake.endpoints import Pty, Tcp
 from epuck_mj.bridge.fake.motors_and_sensors import Wheel
-from epuck_mj.bridge.line.connect import SOCKET_SCHEME, WIFI_SCHEME
+from epuck_mj.bridge.line.connect import SOCKET_SCHEME, WIFI_SCHEME, connect
 from epuck_mj.constants import SPEED_MAX, WHEEL_RADIUS
 from epuck_mj.errors import UserError
 from epuck_mj.host.interruption import SIGNALS, Interrupted, Interruption
 from epuck_mj.policies.file import ControllerFile, Origin
 from epuck_mj.policies.network import Network
+from epuck_mj.policies.wall_follower import WallFollower
 from epuck_mj.step.calibration import Calibration
 from epuck_mj.step.control import TaskParameters
 from epuck_mj.step.motors import STEP_ANGLE
@@ -288,6 +290,54 @@ def test_a_dry_run(kinematic, port, tmp_path):
     trajectory = Trajectory.load(tmp_path / "log.npz")
     assert trajectory.steps == 10
     assert not trajectory.command.any()
+
+
+class Onlooker:
+    """A watcher that lets a drive go on."""
+
+    def say(self, text):
+        pass
+
+    def met(self, greeting, robot):
+        pass
+
+    def saw(self, step, robot):
+        return False
+
+
+@pytest.mark.slow
+def test_a_network_of_ones_own_that_fails(kinematic, tmp_path):
+    """The robot stands, the log stays, and the status is not that of no drive."""
+    calls = itertools.count()
+
+    def policy(observation):
+        if next(calls) == 5:
+            raise UserError("network 'own.py:own' failed")
+        return WallFollower()(observation)
+
+    endpoint = Pty(tmp_path / "e-puck")
+    with living(endpoint, kinematic) as emulator, Interruption() as interruption:
+        mission = Mission(
+            policy=policy,
+            task=TaskParameters(),
+            calibration=Calibration(),
+            n_steps=20,
+            start=(0.0, 0.0, 0.0),
+            speed_max=SPEED_MAX,
+            dry_run=False,
+            calibrate=False,
+            log=tmp_path / "log",
+            verbose=False,
+        )
+        outcome = accomplish(
+            mission, lambda: connect(endpoint.name), Onlooker(), interruption
+        )
+        assert emulator.body.standing
+    assert outcome.status == 3
+    assert outcome.word == (
+        "error: network 'own.py:own' failed; the robot was stopped and stands still"
+    )
+    assert Trajectory.load(tmp_path / "log.npz").steps == 5
 
 
 @pytest.mark.slow

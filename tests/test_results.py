@@ -2,6 +2,7 @@
 
 import functools
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +19,12 @@ from evolution.judging.held_out import Judges
 from evolution.named_policies import NamedPolicy, named_policies
 from evolution.pages.blocks import to_markdown
 from evolution.reproduce.champions_table import champions_table
-from evolution.reproduce.publish import PAGES, pages_with_tables, shipped
+from evolution.reproduce.publish import PAGES, pages_with_tables, ship, shipped
 from evolution.run.directory import RunDirectory
 from evolution.study import data
 from evolution.study.addresses import run_at, runs_at
 from evolution.study.config import StudyConfig, find_study
+from evolution.study.directory import StudyDirectory
 from evolution.study.finished_run import FinishedRun
 
 ROOT = MODELS.parent
@@ -198,3 +200,19 @@ def named_again(names: list[str]) -> list[NamedPolicy]:
         speeds = [float(speed.split()[0])] if speed else []
         found.append(with_slowed(named_policies(path), speeds)[-1])
     return found
+
+
+def test_a_study_begun_with_some_experiments_keeps_the_others(tmp_path):
+    shutil.copytree(RESULTS / "transfer", tmp_path / "copies")
+    shutil.copytree(RESULTS / "transfer", tmp_path / "again")
+    copies = StudyDirectory(tmp_path / "copies")
+    before = copies.stored_config()
+    some = StudyDirectory(tmp_path / "again")
+    only = StudyConfig({"ga-randomised": before.experiments["ga-randomised"]})
+    some.config.write_text(only.to_yaml())
+    some.asked.write_text("ga-randomised: 1-5\n")
+    ship(some.path, copies.path)
+    assert list(copies.stored_config().experiments) == list(before.experiments)
+    assert copies.asked_seeds()["ga-randomised"] == [1, 2, 3, 4, 5]
+    assert copies.asked_seeds()["de-best-randomised"] == [1, 2, 3]
+    assert len(copies.tables.runs(before)) == 9

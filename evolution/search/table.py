@@ -189,3 +189,9 @@ def make_optimizer(
         raise UserError(
             f"optimiser '{parameters.algorithm}' {failure(error)}"
         ) from None
+
+
+def searches(parameters: Any) -> list[Any]:
+    """Parameters of the searches that a hybrid is made of; of any other, itself."""
+    parts = [getattr(parameters, name, None) for name in ("evolution", "first", "then")]
+    return [part for part in parts if part is not None] or [parameters]

@@ -9,6 +9,7 @@ from evolution.search.cma_es import CmaEsParameters
 from evolution.search.differential_evolution import DifferentialEvolutionParameters
 from evolution.search.genetic_algorithm import GeneticAlgorithmParameters
 from evolution.search.l_shade import MIN_POPULATION, LShadeParameters
+from evolution.search.table import searches
 from evolution.settings.config import ExperimentConfig
 
 COPIES = 8 * 8
@@ -40,16 +41,9 @@ def needs(config: ExperimentConfig) -> Iterator[tuple[dict[str, int], int]]:
     yield {"test_starts": config.test_starts} | steps, TRACK_BYTES
     for search in searches(config.optimizer):
         yield from _needs_of_search(search, config)
-    for key in ("batch", "demonstrations"):
-        for search in searches(config.optimizer):
+        for key in ("batch", "demonstrations"):
             if lessons := getattr(search, key, 0):
                 yield {key: lessons} | trials | steps, LESSON_BYTES
-
-
-def searches(optimizer: Any) -> list[Any]:
-    """Parameters of the searches that a hybrid is made of; of any other itself."""
-    parts = [getattr(optimizer, name, None) for name in ("evolution", "first", "then")]
-    return [part for part in parts if part is not None] or [optimizer]
 
 
 def _needs_of_search(

@@ -143,7 +143,7 @@ def accomplish(
         # of a network or a step fitness of the user's own
         if session.start is None:
             raise
-        status, word = FAILED, f"error: {error}; the robot was stopped"
+        status, word = FAILED, f"error: {error}; the robot was stopped and stands still"
     finally:
         try:
             trajectory = save_arrays(mission.log, session, mission.policy)

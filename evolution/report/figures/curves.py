@@ -23,6 +23,7 @@ from evolution.pages.style import (
 )
 from evolution.pages.words import YARDSTICK_LABEL, label, robot_name
 from evolution.report.samples import TARGET_SHARES, hits
+from evolution.search.table import searches
 from evolution.statistics.targets import ecdf
 from evolution.study.data import StudyData
 from evolution.study.finished_run import FinishedRun
@@ -97,8 +98,7 @@ def growth_figure(data: StudyData, name: str) -> tuple[Figure, str]:
     if len(runs) > 1:
         axes.plot(grid, best.T, color=look.color, lw=0.4, alpha=0.35)
     lines["best so far"] = _median_and_band(axes, grid, best, look.color)
-    optimizer = data.configs[name].optimizer
-    parts = (optimizer, *(getattr(optimizer, each, None) for each in ("first", "then")))
+    parts = searches(data.configs[name].optimizer)
     anew = len(runs) > 1 and any(getattr(part, "restarts", False) for part in parts)
     if not anew:
         of_mean = _median_and_band(axes, grid, curves(runs, "mean", grid), "0.45")

@@ -31,13 +31,18 @@ def margins_of_study_figure(data: StudyData) -> tuple[Figure, str] | None:
         return None
     names = {name: label(data, name) for name in data.configs}
     names[YARDSTICK] = YARDSTICK_LABEL
-    shaded = len(margins.experiments) <= FEW
+    shaded = len(_shown(margins, names)) <= FEW
     caption = (
         "Champions on the kinematic robot when one number of the robot is changed: "
         f"medians over runs{', with the quartiles of fitness shaded' * shaded}. "
         "Dotted: the robot on which they evolved."
     )
     return margins_figure(margins, names, data.steps), caption
+
+
+def _shown(margins: Margins, names: Mapping[str, str]) -> list[str]:
+    """Measured experiments that the study still has."""
+    return [name for name in margins.experiments if name in names]
 
 
 @matplotlib.rc_context(PRINT)
@@ -51,7 +56,7 @@ def margins_figure(margins: Margins, names: Mapping[str, str], most: int) -> Fig
         names: of the experiments, for readers.
         most: the most that a trial can earn.
     """
-    experiments = [name for name in margins.experiments if name in names]
+    experiments = _shown(margins, names)
     styles = looks(name for name in experiments if name != YARDSTICK)
     figure = Figure(figsize=(PAGE, 4.4), layout="constrained")
     grid = figure.subplots(2, len(CHANGES), sharex="col", sharey="row")
